@@ -1,0 +1,49 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "leap_object_tracker/geometry/stereo_camera.hpp"
+#include "leap_object_tracker/geometry/stereo_frame.hpp"
+
+namespace leap_object_tracker {
+
+/// What the rectified pair shall look like. Zero: chosen from the calibration.
+struct RectificationParams {
+  int width = 0;                 ///< [px]; default: the raw width
+  int height = 0;                ///< [px]; default: the raw height with square pixels
+  double focal_length = 0;       ///< [px]; default: that of the raw image centre
+  double horizontal_fov_deg = 0; ///< [deg]; sets the focal length instead, if above 0
+};
+
+/// The ideal pair for a calibration: square pixels, common centre, the raw resolution at the centre.
+/// @throw std::invalid_argument for a calibration without size, focal length or baseline, and for
+/// params out of range.
+RectifiedStereoCamera rectifiedCamera(const StereoCalibration& calibration,
+                                      const RectificationParams& params);
+
+/// Turns raw pairs into rectified ones; the tables are built once.
+class StereoRectifier {
+ public:
+  StereoRectifier(const StereoCalibration& calibration, const RectifiedStereoCamera& target);
+
+  /// Bilinear; pixels that the lens does not see are 0.
+  /// @throw std::invalid_argument if the frame is not 8-bit grey of the calibrated size. An empty
+  /// eye stays empty.
+  RectifiedStereoFrame rectify(const RawStereoFrame& frame) const;
+
+  const RectifiedStereoCamera& camera() const { return target_; }
+
+ private:
+  struct Eye {
+    cv::Size raw_size;
+    cv::Mat coordinates;  ///< CV_16SC2
+    cv::Mat weights;      ///< CV_16UC1
+  };
+  static Eye makeEye(const CameraCalibration& raw, const RectifiedStereoCamera& target);
+
+  RectifiedStereoCamera target_;
+  Eye left_;
+  Eye right_;
+};
+
+}  // namespace leap_object_tracker

@@ -1,0 +1,98 @@
+#include "leap_object_tracker/rectification/stereo_rectifier.hpp"
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace leap_object_tracker {
+namespace {
+
+constexpr int kLargestSide = 4096;
+
+cv::Mat remapped(const cv::Mat& raw, const cv::Size& expected, const cv::Mat& coordinates,
+                 const cv::Mat& weights) {
+  if (raw.empty()) return {};
+  if (raw.type() != CV_8UC1 || raw.size() != expected)
+    throw std::invalid_argument(
+        "rectify: the image is " + std::to_string(raw.cols) + "x" + std::to_string(raw.rows) +
+        (raw.type() == CV_8UC1 ? "" : ", not 8-bit grey") + "; the calibration is for " +
+        std::to_string(expected.width) + "x" + std::to_string(expected.height) + " 8-bit grey");
+  cv::Mat rectified;
+  cv::remap(raw, rectified, coordinates, weights, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  return rectified;
+}
+
+}  // namespace
+
+RectifiedStereoCamera rectifiedCamera(const StereoCalibration& calibration,
+                                      const RectificationParams& params) {
+  const CameraCalibration& raw = calibration.left;
+  if (raw.size.area() <= 0 || calibration.right.size != raw.size)
+    throw std::invalid_argument("calibration: image sizes are zero or differ between the eyes");
+  if (!(raw.fx > 0) || !(raw.fy > 0) || !(calibration.right.fx > 0) || !(calibration.right.fy > 0))
+    throw std::invalid_argument("calibration: focal lengths must be above zero (uncalibrated?)");
+  if (!(calibration.baseline > 0))
+    throw std::invalid_argument(
+        "calibration: the baseline must be above zero (P[3] = -fx * baseline of the right eye)");
+  if (params.width < 0 || params.height < 0 || params.width > kLargestSide ||
+      params.height > kLargestSide || params.focal_length < 0 || params.horizontal_fov_deg < 0 ||
+      params.horizontal_fov_deg >= 175)
+    throw std::invalid_argument(
+        "rectification: width and height must be 0 to 4096, focal_length at least 0, "
+        "horizontal_fov_deg 0 to 175");
+
+  RectifiedStereoCamera camera;
+  camera.baseline = calibration.baseline;
+  camera.size.width = params.width > 0 ? params.width : raw.size.width;
+  // Rows may be binned: square pixels need as many times more of them.
+  camera.size.height =
+      params.height > 0
+          ? params.height
+          : static_cast<int>(std::lround(raw.size.height * std::max(1.0, raw.fx / raw.fy)));
+  camera.focal_length =
+      params.horizontal_fov_deg > 0
+          ? camera.size.width / (2 * std::tan(params.horizontal_fov_deg * M_PI / 360))
+      : params.focal_length > 0 ? params.focal_length
+                                : std::max(raw.fx, raw.fy) * camera.size.width / raw.size.width;
+  camera.center_u = (camera.size.width - 1) / 2.0;
+  camera.center_v = (camera.size.height - 1) / 2.0;
+  return camera;
+}
+
+StereoRectifier::StereoRectifier(const StereoCalibration& calibration,
+                                 const RectifiedStereoCamera& target)
+    : target_(target),
+      left_(makeEye(calibration.left, target)),
+      right_(makeEye(calibration.right, target)) {}
+
+StereoRectifier::Eye StereoRectifier::makeEye(const CameraCalibration& raw,
+                                              const RectifiedStereoCamera& target) {
+  constexpr float kOutside = -1e4F;
+  cv::Mat map_u(target.size, CV_32FC1), map_v(target.size, CV_32FC1);
+  for (int v = 0; v < target.size.height; ++v)
+    for (int u = 0; u < target.size.width; ++u) {
+      const Eigen::Vector3d rectified((u - target.center_u) / target.focal_length,
+                                      (v - target.center_v) / target.focal_length, 1);
+      const Eigen::Vector3d ray = raw.rectified_from_raw.transpose() * rectified;
+      Eigen::Vector2d pixel(kOutside, kOutside);
+      if (ray.z() > 1e-3) pixel = pixelFromRay(raw, ray.hnormalized());
+      const bool seen = pixel.allFinite() && pixel.cwiseAbs().maxCoeff() < 1e4;
+      map_u.at<float>(v, u) = seen ? static_cast<float>(pixel.x()) : kOutside;
+      map_v.at<float>(v, u) = seen ? static_cast<float>(pixel.y()) : kOutside;
+    }
+  Eye eye;
+  eye.raw_size = raw.size;
+  cv::convertMaps(map_u, map_v, eye.coordinates, eye.weights, CV_16SC2);
+  return eye;
+}
+
+RectifiedStereoFrame StereoRectifier::rectify(const RawStereoFrame& frame) const {
+  RectifiedStereoFrame rectified;
+  rectified.stamp = frame.stamp;
+  rectified.left = remapped(frame.left, left_.raw_size, left_.coordinates, left_.weights);
+  rectified.right = remapped(frame.right, right_.raw_size, right_.coordinates, right_.weights);
+  return rectified;
+}
+
+}  // namespace leap_object_tracker
