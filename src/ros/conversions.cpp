@@ -1,0 +1,217 @@
+#include "conversions.hpp"
+
+#include <sensor_msgs/distortion_models.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+namespace leap_object_tracker {
+namespace {
+
+[[noreturn]] void complain(const std::string& eye, const std::string& what) {
+  throw std::invalid_argument("camera_info of the " + eye + " eye: " + what);
+}
+
+template <class Numbers>
+bool allFinite(const Numbers& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
+}
+
+void setDistortion(CameraCalibration& camera, const sensor_msgs::CameraInfo& info,
+                   const std::string& eye) {
+  const std::string& model = info.distortion_model;
+  const auto zero = [](double x) { return x == 0; };
+  std::size_t least = 0, most = 0;
+  if (model == sensor_msgs::distortion_models::PLUMB_BOB) {
+    camera.distortion_model = DistortionModel::kPlumbBob;
+    least = 4, most = 5;
+  } else if (model == sensor_msgs::distortion_models::RATIONAL_POLYNOMIAL) {
+    camera.distortion_model = DistortionModel::kRationalPolynomial;
+    least = 8, most = 8;
+  } else if (model == sensor_msgs::distortion_models::EQUIDISTANT || model == "fisheye") {
+    camera.distortion_model = DistortionModel::kEquidistant;
+    least = 4, most = 4;
+  } else if (!model.empty() && model != "none") {
+    complain(eye, "unknown distortion_model '" + model +
+                      "'; known: plumb_bob, rational_polynomial, equidistant, none");
+  }
+  camera.distortion = info.D;
+  while (camera.distortion.size() > most && zero(camera.distortion.back()))
+    camera.distortion.pop_back();
+  const std::size_t count = camera.distortion.size();
+  if (camera.distortion_model == DistortionModel::kEquidistant) {
+    if (count != 4) complain(eye, "equidistant needs 4 coefficients in D");
+    return;
+  }
+  if (std::all_of(camera.distortion.begin(), camera.distortion.end(), zero)) {
+    camera.distortion_model = DistortionModel::kNone;
+    camera.distortion.clear();
+  } else if (count < least || count > most) {
+    complain(eye, "'" + model + "' with " + std::to_string(info.D.size()) +
+                      " coefficients in D; expected " + std::to_string(most));
+  }
+}
+
+CameraCalibration calibrationOf(const sensor_msgs::CameraInfo& info, const std::string& eye) {
+  if (info.width == 0 || info.height == 0) complain(eye, "width and height are zero");
+  if (!allFinite(info.K) || !allFinite(info.D) || !allFinite(info.R) || !allFinite(info.P))
+    complain(eye, "holds numbers that are not finite");
+  if (!(info.K[0] > 0) || !(info.K[4] > 0))
+    complain(eye, "K has no focal length: the camera is not calibrated");
+
+  CameraCalibration camera;
+  const double bin_x = std::max(1U, info.binning_x), bin_y = std::max(1U, info.binning_y);
+  const bool whole = info.roi.width == 0 || info.roi.height == 0;
+  const double width = whole ? info.width : info.roi.width;
+  const double height = whole ? info.height : info.roi.height;
+  camera.size = cv::Size(static_cast<int>(width / bin_x), static_cast<int>(height / bin_y));
+  camera.fx = info.K[0] / bin_x;
+  camera.fy = info.K[4] / bin_y;
+  camera.cx = (info.K[2] - info.roi.x_offset + 0.5) / bin_x - 0.5;
+  camera.cy = (info.K[5] - info.roi.y_offset + 0.5) / bin_y - 0.5;
+  setDistortion(camera, info, eye);
+
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(info.R.data());
+  const double error = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
+  if (!(error < 1e-3) || rotation.determinant() < 0)
+    complain(eye, "R is not a rotation: the pair is not calibrated as a stereo camera");
+  camera.rectified_from_raw = Eigen::Quaterniond(Eigen::Matrix3d(rotation)).normalized();
+  return camera;
+}
+
+double baselineOf(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right) {
+  if (!(left.P[0] > 0)) complain("left", "P has no focal length: the pair is not calibrated");
+  if (!(right.P[0] > 0)) complain("right", "P has no focal length: the pair is not calibrated");
+  const double baseline = left.P[3] / left.P[0] - right.P[3] / right.P[0];
+  if (std::isfinite(baseline) && baseline > 1e-5) return baseline;
+  std::ostringstream what;
+  what << "the baseline is " << baseline << " m; it must be above zero: P[3] = -fx * baseline of "
+       << "the right eye";
+  if (baseline < -1e-5) what << " (are left and right exchanged?)";
+  complain("right", what.str());
+}
+
+}  // namespace
+
+Stamp stampFrom(const ros::Time& time) {
+  return Stamp(std::chrono::nanoseconds(static_cast<std::int64_t>(time.toNSec())));
+}
+
+ros::Time timeFrom(Stamp stamp) {
+  ros::Time time;
+  time.fromNSec(static_cast<std::uint64_t>(stamp.time_since_epoch().count()));
+  return time;
+}
+
+geometry_msgs::Pose messageFrom(const Pose& pose) {
+  const Eigen::Quaterniond rotation(pose.linear());
+  geometry_msgs::Pose message;
+  message.position.x = pose.translation().x();
+  message.position.y = pose.translation().y();
+  message.position.z = pose.translation().z();
+  message.orientation.x = rotation.x();
+  message.orientation.y = rotation.y();
+  message.orientation.z = rotation.z();
+  message.orientation.w = rotation.w();
+  return message;
+}
+
+Pose poseFrom(const geometry_msgs::Pose& message) {
+  const Eigen::Quaterniond rotation(message.orientation.w, message.orientation.x,
+                                    message.orientation.y, message.orientation.z);
+  const Eigen::Vector3d position(message.position.x, message.position.y, message.position.z);
+  if (!position.allFinite() || !rotation.coeffs().allFinite())
+    throw std::invalid_argument("pose: holds numbers that are not finite");
+  if (!(rotation.norm() > 1e-3))
+    throw std::invalid_argument("pose: the quaternion has length zero");
+  Pose pose = Pose::Identity();
+  pose.translation() = position;
+  pose.linear() = rotation.normalized().toRotationMatrix();
+  return pose;
+}
+
+Pose poseFrom(const std::string& text) {
+  std::istringstream numbers(text);
+  geometry_msgs::Pose message;
+  auto& p = message.position;
+  auto& q = message.orientation;
+  std::string rest;
+  if (!(numbers >> p.x >> p.y >> p.z >> q.x >> q.y >> q.z >> q.w) || numbers >> rest)
+    throw std::invalid_argument("pose '" + text +
+                                "': expected seven numbers, \"x y z qx qy qz qw\" [m]");
+  return poseFrom(message);
+}
+
+StereoCalibration calibrationFrom(const sensor_msgs::CameraInfo& left,
+                                  const sensor_msgs::CameraInfo& right) {
+  StereoCalibration calibration;
+  calibration.left = calibrationOf(left, "left");
+  calibration.right = calibrationOf(right, "right");
+  calibration.baseline = baselineOf(left, right);
+  return calibration;
+}
+
+RectifiedStereoCamera rectifiedCameraFrom(const sensor_msgs::CameraInfo& left,
+                                          const sensor_msgs::CameraInfo& right) {
+  if (left.width == 0 || left.height == 0) complain("left", "width and height are zero");
+  if (left.width != right.width || left.height != right.height)
+    complain("right", "its size differs from that of the left eye");
+  RectifiedStereoCamera camera;
+  camera.baseline = baselineOf(left, right);
+  camera.focal_length = left.P[0];
+  camera.center_u = left.P[2];
+  camera.center_v = left.P[6];
+  camera.size = cv::Size(static_cast<int>(left.width), static_cast<int>(left.height));
+  const double tolerance = 1e-3 * camera.focal_length;
+  for (const auto* info : {&left, &right}) {
+    const auto& p = info->P;
+    if (std::abs(p[0] - camera.focal_length) > tolerance ||
+        std::abs(p[5] - camera.focal_length) > tolerance ||
+        std::abs(p[2] - camera.center_u) > tolerance ||
+        std::abs(p[6] - camera.center_v) > tolerance)
+      complain(
+          info == &left ? "left" : "right",
+          "P must have square pixels and one centre for both eyes; rectify with RectifyNodelet");
+  }
+  return camera;
+}
+
+sensor_msgs::CameraInfo messageFrom(const RectifiedStereoCamera& camera, bool right_eye) {
+  const double f = camera.focal_length, u = camera.center_u, v = camera.center_v;
+  sensor_msgs::CameraInfo info;
+  info.width = static_cast<std::uint32_t>(camera.size.width);
+  info.height = static_cast<std::uint32_t>(camera.size.height);
+  info.distortion_model = sensor_msgs::distortion_models::PLUMB_BOB;
+  info.D.assign(5, 0.0);
+  info.K = {f, 0, u, 0, f, v, 0, 0, 1};
+  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.P = {f, 0, u, right_eye ? -f * camera.baseline : 0.0, 0, f, v, 0, 0, 0, 1, 0};
+  return info;
+}
+
+bool sameCamera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
+  return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model &&
+         a.D == b.D && a.K == b.K && a.R == b.R && a.P == b.P && a.binning_x == b.binning_x &&
+         a.binning_y == b.binning_y && a.roi.x_offset == b.roi.x_offset &&
+         a.roi.y_offset == b.roi.y_offset && a.roi.width == b.roi.width &&
+         a.roi.height == b.roi.height;
+}
+
+cv::Mat imageFrom(const sensor_msgs::Image& message) {
+  if (message.encoding != sensor_msgs::image_encodings::MONO8 &&
+      message.encoding != sensor_msgs::image_encodings::TYPE_8UC1)
+    throw std::invalid_argument("image: the encoding is '" + message.encoding +
+                                "'; expected mono8");
+  if (message.width == 0 || message.height == 0 || message.step < message.width ||
+      message.data.size() < static_cast<std::size_t>(message.step) * message.height)
+    throw std::invalid_argument("image: " + std::to_string(message.data.size()) +
+                                " bytes do not hold " + std::to_string(message.width) + "x" +
+                                std::to_string(message.height) + " pixels");
+  return cv::Mat(static_cast<int>(message.height), static_cast<int>(message.width), CV_8UC1,
+                 const_cast<std::uint8_t*>(message.data.data()), message.step);
+}
+
+}  // namespace leap_object_tracker
