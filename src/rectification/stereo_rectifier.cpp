@@ -10,17 +10,18 @@ namespace {
 
 constexpr int kLargestSide = 4096;
 
-cv::Mat remapped(const cv::Mat& raw, const cv::Size& expected, const cv::Mat& coordinates,
-                 const cv::Mat& weights) {
-  if (raw.empty()) return {};
+void remapTo(cv::Mat& rectified, const cv::Mat& raw, const cv::Size& expected,
+             const cv::Mat& coordinates, const cv::Mat& weights) {
+  if (raw.empty()) {
+    rectified.release();
+    return;
+  }
   if (raw.type() != CV_8UC1 || raw.size() != expected)
     throw std::invalid_argument(
         "rectify: the image is " + std::to_string(raw.cols) + "x" + std::to_string(raw.rows) +
         (raw.type() == CV_8UC1 ? "" : ", not 8-bit grey") + "; the calibration is for " +
         std::to_string(expected.width) + "x" + std::to_string(expected.height) + " 8-bit grey");
-  cv::Mat rectified;
   cv::remap(raw, rectified, coordinates, weights, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
-  return rectified;
 }
 
 }  // namespace
@@ -89,10 +90,14 @@ StereoRectifier::Eye StereoRectifier::makeEye(const CameraCalibration& raw,
 
 RectifiedStereoFrame StereoRectifier::rectify(const RawStereoFrame& frame) const {
   RectifiedStereoFrame rectified;
-  rectified.stamp = frame.stamp;
-  rectified.left = remapped(frame.left, left_.raw_size, left_.coordinates, left_.weights);
-  rectified.right = remapped(frame.right, right_.raw_size, right_.coordinates, right_.weights);
+  rectify(frame, rectified);
   return rectified;
+}
+
+void StereoRectifier::rectify(const RawStereoFrame& frame, RectifiedStereoFrame& rectified) const {
+  rectified.stamp = frame.stamp;
+  remapTo(rectified.left, frame.left, left_.raw_size, left_.coordinates, left_.weights);
+  remapTo(rectified.right, frame.right, right_.raw_size, right_.coordinates, right_.weights);
 }
 
 }  // namespace leap_object_tracker

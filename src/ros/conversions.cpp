@@ -82,17 +82,33 @@ CameraCalibration calibrationOf(const sensor_msgs::CameraInfo& info, const std::
   return camera;
 }
 
-double baselineOf(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right) {
-  if (!(left.P[0] > 0)) complain("left", "P has no focal length: the pair is not calibrated");
-  if (!(right.P[0] > 0)) complain("right", "P has no focal length: the pair is not calibrated");
-  const double baseline = left.P[3] / left.P[0] - right.P[3] / right.P[0];
-  if (std::isfinite(baseline) && baseline > 1e-5) return baseline;
-  std::ostringstream what;
-  what << "the baseline is " << baseline << " m; it must be above zero: P[3] = -fx * baseline of "
-       << "the right eye";
-  if (baseline < -1e-5) what << " (are left and right exchanged?)";
-  complain("right", what.str());
-}
+/// Both eyes; one that is missing is like the other.
+struct Twins {
+  Twins(const sensor_msgs::CameraInfo* left_eye, const sensor_msgs::CameraInfo* right_eye)
+      : left(left_eye != nullptr ? left_eye : right_eye),
+        right(right_eye != nullptr ? right_eye : left_eye),
+        one_eye(left_eye == nullptr || right_eye == nullptr) {
+    if (left == nullptr) throw std::invalid_argument("camera_info: both eyes are missing");
+  }
+
+  double baseline() const {
+    constexpr double kBaselineOfLeap = 0.04;
+    if (!(left->P[0] > 0)) complain("left", "P has no focal length: the pair is not calibrated");
+    if (!(right->P[0] > 0)) complain("right", "P has no focal length: the pair is not calibrated");
+    if (one_eye) return left->P[3] < 0 ? -left->P[3] / left->P[0] : kBaselineOfLeap;
+    const double baseline = left->P[3] / left->P[0] - right->P[3] / right->P[0];
+    if (std::isfinite(baseline) && baseline > 1e-5) return baseline;
+    std::ostringstream what;
+    what << "the baseline is " << baseline << " m; it must be above zero: P[3] = -fx * baseline "
+         << "of the right eye";
+    if (baseline < -1e-5) what << " (are left and right exchanged?)";
+    complain("right", what.str());
+  }
+
+  const sensor_msgs::CameraInfo* left;
+  const sensor_msgs::CameraInfo* right;
+  bool one_eye;
+};
 
 }  // namespace
 
@@ -133,6 +149,15 @@ Pose poseFrom(const geometry_msgs::Pose& message) {
   return pose;
 }
 
+Pose poseFrom(const geometry_msgs::TransformStamped& message) {
+  geometry_msgs::Pose pose;
+  pose.position.x = message.transform.translation.x;
+  pose.position.y = message.transform.translation.y;
+  pose.position.z = message.transform.translation.z;
+  pose.orientation = message.transform.rotation;
+  return poseFrom(pose);
+}
+
 Pose poseFrom(const std::string& text) {
   std::istringstream numbers(text);
   geometry_msgs::Pose message;
@@ -145,37 +170,38 @@ Pose poseFrom(const std::string& text) {
   return poseFrom(message);
 }
 
-StereoCalibration calibrationFrom(const sensor_msgs::CameraInfo& left,
-                                  const sensor_msgs::CameraInfo& right) {
+StereoCalibration calibrationFrom(const sensor_msgs::CameraInfo* left,
+                                  const sensor_msgs::CameraInfo* right) {
+  const Twins twins(left, right);
   StereoCalibration calibration;
-  calibration.left = calibrationOf(left, "left");
-  calibration.right = calibrationOf(right, "right");
-  calibration.baseline = baselineOf(left, right);
+  calibration.left = calibrationOf(*twins.left, left != nullptr ? "left" : "right");
+  calibration.right = calibrationOf(*twins.right, right != nullptr ? "right" : "left");
+  calibration.baseline = twins.baseline();
   return calibration;
 }
 
-RectifiedStereoCamera rectifiedCameraFrom(const sensor_msgs::CameraInfo& left,
-                                          const sensor_msgs::CameraInfo& right) {
-  if (left.width == 0 || left.height == 0) complain("left", "width and height are zero");
-  if (left.width != right.width || left.height != right.height)
+RectifiedStereoCamera rectifiedCameraFrom(const sensor_msgs::CameraInfo* left,
+                                          const sensor_msgs::CameraInfo* right) {
+  const Twins twins(left, right);
+  if (twins.left->width == 0 || twins.left->height == 0)
+    complain("left", "width and height are zero");
+  if (twins.left->width != twins.right->width || twins.left->height != twins.right->height)
     complain("right", "its size differs from that of the left eye");
   RectifiedStereoCamera camera;
-  camera.baseline = baselineOf(left, right);
-  camera.focal_length = left.P[0];
-  camera.center_u = left.P[2];
-  camera.center_v = left.P[6];
-  camera.size = cv::Size(static_cast<int>(left.width), static_cast<int>(left.height));
+  camera.baseline = twins.baseline();
+  const auto& p = twins.left->P;
+  camera.focal_length = p[0];
+  camera.center_u = p[2];
+  camera.center_v = p[6];
+  camera.size = cv::Size(static_cast<int>(twins.left->width), static_cast<int>(twins.left->height));
   const double tolerance = 1e-3 * camera.focal_length;
-  for (const auto* info : {&left, &right}) {
-    const auto& p = info->P;
-    if (std::abs(p[0] - camera.focal_length) > tolerance ||
-        std::abs(p[5] - camera.focal_length) > tolerance ||
-        std::abs(p[2] - camera.center_u) > tolerance ||
-        std::abs(p[6] - camera.center_v) > tolerance)
-      complain(
-          info == &left ? "left" : "right",
-          "P must have square pixels and one centre for both eyes; rectify with RectifyNodelet");
-  }
+  const auto matches = [&](const sensor_msgs::CameraInfo& info) {
+    return std::abs(info.P[0] - p[0]) <= tolerance && std::abs(info.P[5] - p[0]) <= tolerance &&
+           std::abs(info.P[2] - p[2]) <= tolerance && std::abs(info.P[6] - p[6]) <= tolerance;
+  };
+  if (!matches(*twins.left) || !matches(*twins.right))
+    complain("left or right",
+             "P must have square pixels and one centre for both eyes; use RectifyNodelet");
   return camera;
 }
 
@@ -198,6 +224,11 @@ bool sameCamera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo&
          a.binning_y == b.binning_y && a.roi.x_offset == b.roi.x_offset &&
          a.roi.y_offset == b.roi.y_offset && a.roi.width == b.roi.width &&
          a.roi.height == b.roi.height;
+}
+
+bool sameCamera(const RectifiedStereoCamera& a, const RectifiedStereoCamera& b) {
+  return a.size == b.size && a.focal_length == b.focal_length && a.center_u == b.center_u &&
+         a.center_v == b.center_v && a.baseline == b.baseline;
 }
 
 cv::Mat imageFrom(const sensor_msgs::Image& message) {

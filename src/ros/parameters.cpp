@@ -7,6 +7,9 @@
 namespace leap_object_tracker {
 namespace {
 
+const std::vector<std::pair<std::string, Eyes>> kEyes{
+    {"both", Eyes::kBoth}, {"left", Eyes::kLeft}, {"right", Eyes::kRight}};
+
 std::string printed(double value) {
   std::ostringstream text;
   text << value;
@@ -51,22 +54,21 @@ ParameterReader::ParameterReader(const YAML::Node& tree, std::string where)
 }
 
 YAML::Node ParameterReader::child(const std::string& key) const {
-  const YAML::Node& tree = tree_;
-  return tree.IsMap() ? tree[key] : YAML::Node();
+  const YAML::Node& tree = tree_;  // a node that is not const would grow the key
+  if (!tree.IsMap() || !tree[key]) return YAML::Node();
+  return tree[key];
 }
 
 template <class T>
-bool ParameterReader::find(const std::string& key, T& value, const std::string& expected) {
+void ParameterReader::find(const std::string& key, T& value, const std::string& expected) {
   known_.insert(key);
   const YAML::Node node = child(key);
-  if (node && !node.IsNull()) {
-    try {
-      value = node.as<T>();
-    } catch (const YAML::Exception&) {
-      refuse(key, node.IsScalar() ? node.Scalar() : "not a single value", expected);
-    }
+  if (node.IsNull()) return;
+  try {
+    value = node.as<T>();
+  } catch (const YAML::Exception&) {
+    refuse(key, node.IsScalar() ? node.Scalar() : "not a single value", expected);
   }
-  return true;
 }
 
 void ParameterReader::refuse(const std::string& key, const std::string& value,
@@ -123,10 +125,9 @@ TrackerNodeParams readTrackerNodeParams(ParameterReader& reader) {
   reader.read("start", params.start);
   reader.read("tf_patience", params.tf_patience, {0, 1});
   reader.read("overlay_rate", params.overlay_rate, {0, 1000});
-  reader.read("markers", params.markers, {0, 100000});
+  reader.read("shown_particles", params.shown_particles, {0, 100000});
   reader.read("measurement", tracker.measurement);
-  reader.read<Eyes>("eyes", tracker.eyes,
-                    {{"both", Eyes::kBoth}, {"left", Eyes::kLeft}, {"right", Eyes::kRight}});
+  reader.read<Eyes>("eyes", tracker.eyes, kEyes);
   reader.read("threads", tracker.threads, {1, 256});
   reader.section("motion", [&](ParameterReader& r) {
     MotionParams& p = tracker.motion;
@@ -164,13 +165,15 @@ TrackerNodeParams readTrackerNodeParams(ParameterReader& reader) {
   return params;
 }
 
-RectificationParams readRectificationParams(ParameterReader& reader) {
-  RectificationParams params;
-  reader.read("width", params.width, {0, 4096});
-  reader.read("height", params.height, {0, 4096});
-  reader.read("focal_length", params.focal_length, {0, 10000});
-  reader.read("horizontal_fov_deg", params.horizontal_fov_deg, {0, 174});
-  for (const char* key : {"rect", "image_transport"}) reader.ignore(key);
+RectifyNodeParams readRectifyNodeParams(ParameterReader& reader) {
+  RectifyNodeParams params;
+  RectificationParams& p = params.rectification;
+  reader.read("width", p.width, {0, 4096});
+  reader.read("height", p.height, {0, 4096});
+  reader.read("focal_length", p.focal_length, {0, 10000});
+  reader.read("horizontal_fov_deg", p.horizontal_fov_deg, {0, 174});
+  reader.read<Eyes>("eyes", params.eyes, kEyes);
+  reader.ignore("image_transport");
   reader.finish();
   return params;
 }

@@ -74,7 +74,7 @@ class ParameterReader {
 
  private:
   template <class T>
-  bool find(const std::string& key, T& value, const std::string& expected);
+  void find(const std::string& key, T& value, const std::string& expected);
   YAML::Node child(const std::string& key) const;
   [[noreturn]] void refuse(const std::string& key, const std::string& value,
                            const std::string& expected) const;
@@ -94,12 +94,17 @@ struct TrackerNodeParams {
   std::string start = "search";  ///< search | wait | "x y z qx qy qz qw" in the left camera
   double tf_patience = 0.004;    ///< [s] to wait for the transform of the fixed frame
   double overlay_rate = 15;      ///< [Hz] at most; 0: none
-  int markers = 200;             ///< particles shown at most
+  int shown_particles = 200;     ///< in the PoseArray at most
+};
+
+struct RectifyNodeParams {
+  RectificationParams rectification;
+  Eyes eyes = Eyes::kBoth;  ///< an eye that is not wanted may be missing
 };
 
 /// @throw std::invalid_argument naming key, value and what is allowed.
 TrackerNodeParams readTrackerNodeParams(ParameterReader& reader);
-RectificationParams readRectificationParams(ParameterReader& reader);
+RectifyNodeParams readRectifyNodeParams(ParameterReader& reader);
 
 /// @throw std::invalid_argument naming the file and what is wrong with it.
 YAML::Node loadYamlFile(const std::string& path);

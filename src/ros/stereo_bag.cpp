@@ -54,13 +54,13 @@ std::optional<sensor_msgs::CameraInfo> StereoBag::firstInfo(const std::string& t
 
 void StereoBag::readCalibration() {
   const auto left = firstInfo(topics_.left_info), right = firstInfo(topics_.right_info);
-  if (!left) complain("has no messages on " + topics_.left_info);
-  if (!right) complain("has no messages on " + topics_.right_info);
-  left_info_ = *left;
-  right_info_ = *right;
-  camera_frame_ = left->header.frame_id;
+  if (!left && eyes_ != Eyes::kRight) complain("has no messages on " + topics_.left_info);
+  if (!right && eyes_ != Eyes::kLeft) complain("has no messages on " + topics_.right_info);
+  left_info_ = left ? *left : *right;
+  right_info_ = right ? *right : *left;
+  camera_frame_ = left_info_.header.frame_id;
   try {
-    calibration_ = calibrationFrom(*left, *right);
+    calibration_ = calibrationFrom(left ? &*left : nullptr, right ? &*right : nullptr);
   } catch (const std::invalid_argument& error) {
     complain(error.what());
   }

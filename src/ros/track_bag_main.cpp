@@ -1,4 +1,4 @@
-#include <tf2_eigen/tf2_eigen.h>
+#include <tf2/exceptions.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -173,7 +173,7 @@ class BagTracking {
   static RectificationParams rectification(const CommandLine& line) {
     ParameterReader reader(line.has("rectify") ? loadYamlFile(line.text("rectify")) : YAML::Node(),
                            "file '" + line.text("rectify") + "'");
-    return readRectificationParams(reader);
+    return readRectifyNodeParams(reader).rectification;
   }
 
   static void warn(const std::string& what) { std::cerr << "track_bag: warning: " << what << "\n"; }
@@ -181,10 +181,8 @@ class BagTracking {
   std::optional<Pose> fixedFromCamera(Stamp stamp) {
     if (!transforms_) return std::nullopt;
     try {
-      return Pose(
-          tf2::transformToEigen(transforms_->lookupTransform(line_.text("fixed-frame"),
-                                                             bag_.cameraFrame(), timeFrom(stamp)))
-              .matrix());
+      return poseFrom(transforms_->lookupTransform(line_.text("fixed-frame"), bag_.cameraFrame(),
+                                                   timeFrom(stamp)));
     } catch (const tf2::TransformException&) {
       ++no_transform_;
       return std::nullopt;

@@ -30,6 +30,8 @@ class StereoRectifier {
   /// @throw std::invalid_argument if the frame is not 8-bit grey of the calibrated size. An empty
   /// eye stays empty.
   RectifiedStereoFrame rectify(const RawStereoFrame& frame) const;
+  /// The same into images that are there already, if they have the size.
+  void rectify(const RawStereoFrame& frame, RectifiedStereoFrame& rectified) const;
 
   const RectifiedStereoCamera& camera() const { return target_; }
 
