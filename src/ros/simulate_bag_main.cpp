@@ -18,7 +18,8 @@ namespace {
 
 constexpr char kUsage[] =
     "usage: simulate_bag SCENE.yaml OUT.bag [--seed N] [--frames N] [--object FILE.yaml]\n"
-    "Writes what a Leap would record of the scene: /leap/{left,right}/image_raw and camera_info, with\n"
+    "Writes what a Leap would record of the scene: /leap/{left,right}/image_raw and camera_info, "
+    "with\n"
     "the truth: /ground_truth/pose, /ground_truth/visible (x left, y right: share of the object's\n"
     "visible side that the eye sees), and /tf if the camera moves.\n";
 

@@ -58,12 +58,23 @@ inline sensor_msgs::CameraInfo cameraInfoMessage(const StereoCalibration& calibr
   std::copy(rotation.data(), rotation.data() + 9, info.R.begin());
   const double focal_length = calibration.left.fx;
   const double baseline_term = right ? -focal_length * calibration.baseline : 0.0;
-  info.P = {focal_length, 0, (eye.size.width - 1) / 2.0,  baseline_term, 0, focal_length,
-            (eye.size.height - 1) / 2.0, 0, 0, 0, 1, 0};
+  info.P = {focal_length,
+            0,
+            (eye.size.width - 1) / 2.0,
+            baseline_term,
+            0,
+            focal_length,
+            (eye.size.height - 1) / 2.0,
+            0,
+            0,
+            0,
+            1,
+            0};
   return info;
 }
 
-inline geometry_msgs::PoseStamped truthMessage(const SimulatedFrame& frame, const ros::Time& stamp) {
+inline geometry_msgs::PoseStamped truthMessage(const SimulatedFrame& frame,
+                                               const ros::Time& stamp) {
   geometry_msgs::PoseStamped message;
   message.header = headerOf(stamp, kLeftFrame);
   message.pose = tf2::toMsg(frame.camera_from_object);

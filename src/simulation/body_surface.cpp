@@ -33,8 +33,7 @@ Eigen::Vector3f BodySurface::normal(std::uint32_t triangle, float u, float v) co
   if (creases_.empty()) return normal;
   const Eigen::Vector3f at = point(triangle, u, v);
   for (const Crease& crease : creases_[triangle]) {
-    const float along =
-        std::clamp((at - crease.start).dot(crease.direction), 0.0F, crease.length);
+    const float along = std::clamp((at - crease.start).dot(crease.direction), 0.0F, crease.length);
     const float distance = (at - crease.start - along * crease.direction).norm();
     if (distance >= edge_radius_) continue;
     const float share = distance / edge_radius_;
@@ -48,7 +47,8 @@ void BodySurface::findNormals() {
   std::vector<Eigen::Vector3f> weighted;  // length: twice the area
   for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
     const auto& t = triangles_[i];
-    weighted.push_back((vertices_[t[1]] - vertices_[t[0]]).cross(vertices_[t[2]] - vertices_[t[0]]));
+    weighted.push_back(
+        (vertices_[t[1]] - vertices_[t[0]]).cross(vertices_[t[2]] - vertices_[t[0]]));
     face_normals_.push_back(weighted.back().normalized());
     for (const auto vertex : t) faces_of[vertex].push_back(i);
   }
@@ -84,8 +84,9 @@ void BodySurface::findCreases() {
     }
     const Eigen::Vector3f start = vertices_[edge.first.first];
     const Eigen::Vector3f span = vertices_[edge.first.second] - start;
-    const Crease crease{start, span.normalized(), span.norm(),
-                        (face_normals_[a] + face_normals_[b] + 1e-4F * face_normals_[a]).normalized()};
+    const Crease crease{
+        start, span.normalized(), span.norm(),
+        (face_normals_[a] + face_normals_[b] + 1e-4F * face_normals_[a]).normalized()};
     own[a].push_back(crease);
     own[b].push_back(crease);
   }

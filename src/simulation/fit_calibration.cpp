@@ -118,8 +118,7 @@ CameraCalibration fitEye(const LeapLens& lens, double& rms, double& largest) {
 FittedCalibration fitCalibration(const LeapUnit& unit, const SensorMode& mode) {
   FittedCalibration fitted;
   fitted.calibration.baseline = unit.baseline;
-  fitted.calibration.left =
-      fitEye(LeapLens(unit.left, mode), fitted.left_rms, fitted.left_largest);
+  fitted.calibration.left = fitEye(LeapLens(unit.left, mode), fitted.left_rms, fitted.left_largest);
   fitted.calibration.right =
       fitEye(LeapLens(unit.right, mode), fitted.right_rms, fitted.right_largest);
   return fitted;

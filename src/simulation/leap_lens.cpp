@@ -69,9 +69,9 @@ LeapLens::LeapLens(const LeapEyeRecord& record, const SensorMode& mode)
       p1_(record.tangential[0]),
       p2_(record.tangential[1]),
       // The stored vector is y up and as long as the angle; the optical frame is y down.
-      rectified_from_raw_(cayley(0.5 * Eigen::Vector3d(-record.rotation_vector.x(),
-                                                       record.rotation_vector.y(),
-                                                       -record.rotation_vector.z()))) {}
+      rectified_from_raw_(
+          cayley(0.5 * Eigen::Vector3d(-record.rotation_vector.x(), record.rotation_vector.y(),
+                                       -record.rotation_vector.z()))) {}
 
 double LeapLens::radialFactor(double t) const {
   return (1 + t * (k_[0] + t * (k_[1] + t * k_[2]))) / (1 + t * (k_[3] + t * (k_[4] + t * k_[5])));

@@ -73,7 +73,7 @@ void embedMetadata(cv::Mat& left, cv::Mat& right, const SensorControls& controls
   constexpr unsigned kLabel2 = 0;
   const unsigned label1 = lit ? 1 : 0;
   const std::array<unsigned, kMetadataPixels> samples{
-      kMetadataTag, kLabel2 >> 4,      kLabel2 & 0x0F, label1 << 4 | (exposure >> 5 & 0x0F),
+      kMetadataTag,    kLabel2 >> 4, kLabel2 & 0x0F, label1 << 4 | (exposure >> 5 & 0x0F),
       exposure & 0x1F, gain & 0x1F};
   for (int i = 0; i < kMetadataPixels; ++i)
     for (cv::Mat* image : {&left, &right})
@@ -81,10 +81,11 @@ void embedMetadata(cv::Mat& left, cv::Mat& right, const SensorControls& controls
           static_cast<std::uint8_t>(samples[static_cast<std::size_t>(i)]);
 }
 
-SensorControls AutoExposure::after(const cv::Mat& left, const SensorControls& controls) {
-  constexpr double kTarget = 190;          // [counts] of the brightest
+SensorControls AutoExposure::after(const cv::Mat& left, const cv::Mat& right,
+                                   const SensorControls& controls) {
+  constexpr double kTarget = 190;           // [counts] of the brightest
   constexpr double kBrightestShare = 2e-3;  // of all pixels
-  constexpr int kEvery = 3, kDelay = 2;    // [frames]
+  constexpr int kEvery = 3, kDelay = 2;     // [frames]
 
   SensorControls next = controls;
   if (frames_until_obeyed_ == 0) next = wanted_;
@@ -92,9 +93,10 @@ SensorControls AutoExposure::after(const cv::Mat& left, const SensorControls& co
   if (frames_++ % kEvery != 0 || frames_until_obeyed_ >= 0) return next;
 
   std::array<int, 256> histogram{};
-  for (int v = 0; v < left.rows - 1; ++v)
-    for (int u = 0; u < left.cols; ++u) ++histogram[left.at<std::uint8_t>(v, u)];
-  const int wanted_pixels = static_cast<int>(kBrightestShare * left.rows * left.cols);
+  for (const cv::Mat* image : {&left, &right})
+    for (int v = 0; v < image->rows - 1; ++v)
+      for (int u = 0; u < image->cols; ++u) ++histogram[image->at<std::uint8_t>(v, u)];
+  const int wanted_pixels = static_cast<int>(kBrightestShare * 2 * left.rows * left.cols);
   double sum = 0;
   int pixels = 0;
   for (int value = 255; value >= 0 && pixels < wanted_pixels; --value) {
@@ -109,9 +111,8 @@ SensorControls AutoExposure::after(const cv::Mat& left, const SensorControls& co
   if (factor > 0.93 && factor < 1.07) return next;
 
   constexpr int kUnitGain = 16, kMostGain = 31;
-  const double product =
-      std::clamp(next.exposure_us * next.gain * factor, 10.0 * kUnitGain,
-                 longest_exposure_us_ * kMostGain);
+  const double product = std::clamp(next.exposure_us * next.gain * factor, 10.0 * kUnitGain,
+                                    longest_exposure_us_ * kMostGain);
   wanted_ = next;
   wanted_.exposure_us = std::round(std::clamp(product / kUnitGain, 10.0, longest_exposure_us_));
   wanted_.gain = std::clamp(static_cast<int>(std::lround(product / wanted_.exposure_us)), kUnitGain,

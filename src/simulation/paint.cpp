@@ -44,8 +44,8 @@ std::uint64_t nearestCell(std::uint64_t seed, const Eigen::Vector3f& p) {
         const Cell cell = home + Cell(dx, dy, dz);
         const std::uint64_t here = cellName(seed, cell);
         const Eigen::Vector3f at =
-            cell.cast<float>() + Eigen::Vector3f(uniformOf(here), uniformOf(mixed(here, 1)),
-                                                 uniformOf(mixed(here, 2)));
+            cell.cast<float>() +
+            Eigen::Vector3f(uniformOf(here), uniformOf(mixed(here, 1)), uniformOf(mixed(here, 2)));
         const float distance = (at - p).squaredNorm();
         if (distance < nearest) nearest = distance, name = here;
       }
@@ -77,8 +77,8 @@ float pattern(const Paint& paint, const Eigen::Vector3f& p) {
 
 float albedoAt(const Paint& paint, const Eigen::Vector3f& point_in_body) {
   const Eigen::Vector3f p = point_in_body / static_cast<float>(paint.scale);
-  float albedo = static_cast<float>(
-      paint.albedo_low + (paint.albedo_high - paint.albedo_low) * pattern(paint, p));
+  float albedo = static_cast<float>(paint.albedo_low +
+                                    (paint.albedo_high - paint.albedo_low) * pattern(paint, p));
   if (paint.grain > 0) {
     constexpr float kGrainSize = 3e-4F;  // [m]
     const float random = valueNoise(mixed(paint.seed, 99), point_in_body / kGrainSize);

@@ -43,8 +43,10 @@ YAML::Node loadTree(const std::string& path, int depth = 0) {
     for (auto body : root["bodies"]) makeAbsolute(body, "file", path);
   if (!root["based_on"]) return root;
   if (depth >= kDeepestBase)
-    throw std::runtime_error("scene file '" + path + "', key 'based_on': the files go round in a ring");
-  const YAML::Node base = loadTree(absolutePath(path, root["based_on"].as<std::string>()), depth + 1);
+    throw std::runtime_error("scene file '" + path +
+                             "', key 'based_on': the files go round in a ring");
+  const YAML::Node base =
+      loadTree(absolutePath(path, root["based_on"].as<std::string>()), depth + 1);
   root.remove("based_on");
   return merged(base, root);
 }
@@ -96,7 +98,8 @@ MotionScript readMotion(YamlSection section, std::uint64_t seed) {
   section.readVector("orientation_deg", degrees, 360, "deg");
   section.read("upright", upright, "true or false");
   // Upright: the body's z points up in the image and its y away from the camera.
-  const Eigen::Quaterniond base = upright ? turnFromDegrees({90, 0, 0}) : turnFromDegrees({0, 0, 0});
+  const Eigen::Quaterniond base =
+      upright ? turnFromDegrees({90, 0, 0}) : turnFromDegrees({0, 0, 0});
   motion.rest.translation() = position;
   motion.rest.linear() = (turnFromDegrees(degrees) * base).toRotationMatrix();
 
@@ -194,13 +197,15 @@ void readLook(YamlSection& section, SceneBody& body, std::uint64_t seed) {
 Mesh readInlineShape(YamlSection& section) {
   const auto shape = chosen<Shape>(
       section, "shape",
-      {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}, {"prism", Shape::kPrism}}, Shape::kBox);
+      {{"box", Shape::kBox}, {"cylinder", Shape::kCylinder}, {"prism", Shape::kPrism}},
+      Shape::kBox);
   const std::string expected = shape == Shape::kBox        ? "[x, y, z] in metres"
                                : shape == Shape::kCylinder ? "[radius, height] in metres"
                                                            : "[side, height] in metres";
   std::vector<double> numbers;
   section.require("size", numbers, expected);
-  if (numbers.size() != (shape == Shape::kBox ? 3U : 2U)) section.complain("size", "expected " + expected);
+  if (numbers.size() != (shape == Shape::kBox ? 3U : 2U))
+    section.complain("size", "expected " + expected);
   Eigen::Vector3d size = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     if (!(numbers[i] > 0 && numbers[i] <= 10))

@@ -54,8 +54,9 @@ class Simulator::Impl {
     frame.raw.stamp = start_ + std::chrono::nanoseconds(std::llround(middle * 1e9));
     frame.controls = controls_;
     const int dark = controls_.dark_interval;
-    frame.lit = (dark == 0 || (dark > 1 && (frame_ + 1) % dark != 0)) &&
-                std::any_of(controls_.leds.begin(), controls_.leds.end(), [](bool on) { return on; });
+    frame.lit =
+        (dark == 0 || (dark > 1 && (frame_ + 1) % dark != 0)) &&
+        std::any_of(controls_.leds.begin(), controls_.leds.end(), [](bool on) { return on; });
 
     const double half = controls_.exposure_us * 1e-6 / 2;
     std::vector<BodyPath> paths;
@@ -79,7 +80,7 @@ class Simulator::Impl {
     frame.right_visible = renderer_.visibleShare(1);
 
     if (scene_.sensor.auto_exposure && frame.lit)
-      controls_ = auto_exposure_.after(frame.raw.left, controls_);
+      controls_ = auto_exposure_.after(frame.raw.left, frame.raw.right, controls_);
     time_ += frameInterval(scene_, timing_);
     ++frame_;
     ++frames_ever_;

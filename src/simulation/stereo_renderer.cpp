@@ -20,10 +20,11 @@ using Eigen::Vector3f;
 constexpr int kLeds = 3;
 constexpr std::uint32_t kNothing = std::numeric_limits<std::uint32_t>::max();
 constexpr float kNoDepth = std::numeric_limits<float>::infinity();
-constexpr float kLedSpacing = 0.035F;     // [m] between neighbours, along the baseline
-constexpr float kLedRadius = 0.0015F;     // [m] softens shadows
-constexpr float kShadowOffset = 2e-5F;    // [m] keeps a surface from shading itself
-constexpr float kCreaseCosine = 0.985F;   // neighbours whose normals differ more lie on an edge
+constexpr float kLedSpacing = 0.035F;    // [m] between neighbours, along the baseline
+constexpr float kLedRadius = 0.0015F;    // [m] softens shadows
+constexpr float kShadowOffset = 2e-5F;   // [m] keeps a surface from shading itself
+constexpr float kCreaseCosine = 0.985F;  // neighbours whose normals differ more lie on an edge
+constexpr float kUnseen = 0.05F;         // of the visible contrast: not worth a ray
 constexpr std::size_t kSurfacePoints = 600;
 
 /// Where a body is at a share of the exposure: as Embree does it, matrices blended linearly.
@@ -32,7 +33,8 @@ struct Path {
   Vector3f offset_open, offset_close;
 
   Vector3f apply(const Vector3f& point, float time) const {
-    return (1 - time) * (turn_open * point + offset_open) + time * (turn_close * point + offset_close);
+    return (1 - time) * (turn_open * point + offset_open) +
+           time * (turn_close * point + offset_close);
   }
   Vector3f rotate(const Vector3f& direction, float time) const {
     return (1 - time) * (turn_open * direction) + time * (turn_close * direction);
@@ -151,10 +153,10 @@ class StereoRenderer::Impl {
   /// One eye: what does not change from frame to frame.
   struct View {
     Vector3f origin;
-    std::vector<Vector3f> rays;      ///< unit, one a pixel centre
-    std::vector<float> vignetting;   ///< one a pixel
-    std::vector<Sight> resting;      ///< pixel centres, resting bodies only
-    std::vector<Sight> sights;       ///< pixel centres, all bodies
+    std::vector<Vector3f> rays;     ///< unit, one a pixel centre
+    std::vector<float> vignetting;  ///< one a pixel
+    std::vector<Sight> resting;     ///< pixel centres, resting bodies only
+    std::vector<Sight> sights;      ///< pixel centres, all bodies
   };
 
   void addBody(const SceneBody& body) {
@@ -188,8 +190,7 @@ class StereoRenderer::Impl {
     std::vector<double> area_up_to{0};
     for (const auto& t : surface.triangles()) {
       const auto& v = surface.vertices();
-      area_up_to.push_back(area_up_to.back() +
-                           (v[t[1]] - v[t[0]]).cross(v[t[2]] - v[t[0]]).norm());
+      area_up_to.push_back(area_up_to.back() + (v[t[1]] - v[t[0]]).cross(v[t[2]] - v[t[0]]).norm());
     }
     HashRandom random(1);
     for (std::size_t i = 0; i < kSurfacePoints; ++i) {
@@ -314,8 +315,18 @@ class StereoRenderer::Impl {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     Met met;
-    met.hit.ray = {origin.x(),    origin.y(),    origin.z(), 1e-4F, direction.x(), direction.y(),
-                   direction.z(), time,          limit,      ~0U,   0,             0};
+    met.hit.ray = {origin.x(),
+                   origin.y(),
+                   origin.z(),
+                   1e-4F,
+                   direction.x(),
+                   direction.y(),
+                   direction.z(),
+                   time,
+                   limit,
+                   ~0U,
+                   0,
+                   0};
     met.hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(scene, &context, &met.hit);
     met.anything = met.hit.hit.geomID != RTC_INVALID_GEOMETRY_ID;
@@ -323,7 +334,8 @@ class StereoRenderer::Impl {
   }
 
   /// Light that a surface sends towards the eye: Lambert and Blinn and Phong, LEDs with inverse
-  /// square and a cos^n lobe. @param jitter moves the point of an LED that is seen; zero: its middle
+  /// square and a cos^n lobe. @param jitter moves the point of an LED that is seen; zero: its
+  /// middle
   Sight shade(const Met& met, const Vector3f& direction, float time, bool shadows_of_moving,
               const Eigen::Vector2f& jitter) const {
     const std::uint32_t body = met.hit.hit.instID[0];
@@ -345,28 +357,29 @@ class StereoRenderer::Impl {
     const float albedo = albedoAt(paint, in_body);
     const Vector3f from = at + kShadowOffset * sight.normal;
     for (std::size_t i = 0; i < kLeds; ++i) {
-      const Vector3f led =
-          leds_[i] + Vector3f(kLedRadius * jitter.x(), kLedRadius * jitter.y(), 0);
+      const Vector3f led = leds_[i] + Vector3f(kLedRadius * jitter.x(), kLedRadius * jitter.y(), 0);
       const Vector3f span = led - from;
       const float distance = span.norm();
       const Vector3f toward_led = span / distance;
       const float cosine = sight.normal.dot(toward_led);
       const float lobe_cosine = -toward_led.z();
       if (cosine <= 0 || lobe_cosine <= 0) continue;
-      if (blocked(resting_scene_, from, span, time)) continue;
-      if (shadows_of_moving && movingShadow(from, span, time)) {
-        sight.shaded |= static_cast<std::uint8_t>(1U << i);
-        continue;
-      }
-      const float falloff =
-          static_cast<float>(scene_.light.power) *
-          std::pow(lobe_cosine, static_cast<float>(scene_.light.lobe_exponent)) /
-          (distance * distance);
+      const float falloff = static_cast<float>(scene_.light.power) *
+                            std::pow(lobe_cosine, static_cast<float>(scene_.light.lobe_exponent)) /
+                            (distance * distance);
       const Vector3f half_way = (toward_led - direction).normalized();
       const auto shininess = static_cast<float>(paint.shininess);
       const float highlight = static_cast<float>(paint.gloss) * (shininess + 2) / 8 *
                               std::pow(std::max(0.0F, sight.normal.dot(half_way)), shininess);
-      sight.light.of_led[i] = falloff * cosine * (albedo + highlight);
+      const float light = falloff * cosine * (albedo + highlight);
+      if (light > kUnseen * contrast_) {
+        if (blocked(resting_scene_, from, span, time)) continue;
+        if (shadows_of_moving && movingShadow(from, span, time)) {
+          sight.shaded |= static_cast<std::uint8_t>(1U << i);
+          continue;
+        }
+      }
+      sight.light.of_led[i] = light;
     }
     // More light from above than from below.
     sight.light.ambient =
@@ -403,42 +416,51 @@ class StereoRenderer::Impl {
 
   /// Do the neighbours of a pixel differ so much that one ray cannot speak for it?
   template <class Ignore>
-  Need needOf(const std::vector<Sight>& sights, int u, int v, int reach, const Ignore& ignore) const {
+  Need needOf(const std::vector<Sight>& sights, int u, int v, int reach,
+              const Ignore& ignore) const {
     const Sight& here = sights[index(u, v)];
     const float value = valueOf(here);
-    Need need = Need::kNothing;
     for (int y = std::max(0, v - reach); y <= std::min(scene_.mode.height - 1, v + reach); ++y)
       for (int x = std::max(0, u - reach); x <= std::min(scene_.mode.width - 1, u + reach); ++x) {
         const Sight& other = sights[index(x, y)];
         if (ignore(here, other)) continue;
-        if (other.body != here.body || other.shaded != here.shaded) return Need::kEdge;
-        if (here.body == kNothing) continue;
         const float difference = std::abs(valueOf(other) - value);
-        if (difference < contrast_) continue;
-        if (other.normal.dot(here.normal) < kCreaseCosine) return Need::kEdge;
-        if (difference > 3 * contrast_ || difference > 0.2F * value) need = Need::kTexture;
+        if (difference < kUnseen * contrast_) continue;
+        if (other.body != here.body || other.shaded != here.shaded) return Need::kEdge;
+        if (other.normal.dot(here.normal) < kCreaseCosine && difference > contrast_)
+          return Need::kEdge;
       }
-    return need;
+    // An even slope of light is no texture: one ray in its middle is right.
+    const auto bends = [&](int du, int dv) {
+      if (u < du || v < dv || u + du >= scene_.mode.width || v + dv >= scene_.mode.height)
+        return false;
+      const Sight& before = sights[index(u - du, v - dv)];
+      const Sight& after = sights[index(u + du, v + dv)];
+      if (ignore(here, before) && ignore(here, after)) return false;
+      return std::abs(0.5F * (valueOf(before) + valueOf(after)) - value) > 2 * contrast_;
+    };
+    return here.body != kNothing && (bends(1, 0) || bends(0, 1)) ? Need::kTexture : Need::kNothing;
   }
 
   /// Average over rays spread evenly over the pixel, the exposure and the LEDs' area.
   template <class Sample>
   Light average(const LeapLens& lens, int u, int v, int samples, std::uint64_t name,
                 const Sample& sample) const {
-    // The plane's low-discrepancy sequence of Roberts (2018), from a random start.
+    // Hammersley's points, digits scrambled (Kollig and Keller 2002): stratified along rows, along
+    // columns and in both, so that the share of a pixel that a body covers is exact to about 1 / n.
     HashRandom random(name, index(u, v));
-    const double start_x = random.uniform(), start_y = random.uniform();
-    const double start_time = random.uniform(), start_led = random.uniform();
-    constexpr double kStepX = 0.7548776662466927, kStepY = 0.5698402909980532;
+    const auto scramble = static_cast<std::uint32_t>(random.bits());
+    const double start_x = random.uniform(), start_time = random.uniform();
+    const double start_led = random.uniform();
     constexpr double kStepTime = 0.6180339887498949, kStepLed = 0.4142135623730951;
     const auto part = [](double x) { return x - std::floor(x); };
     Light sum;
     for (int i = 0; i < samples; ++i) {
-      const double at_u = u - 0.5 + part(start_x + i * kStepX);
-      const double at_v = v - 0.5 + part(start_y + i * kStepY);
+      const double at_u = u - 0.5 + (i + start_x) / samples;
+      const double at_v = v - 0.5 + (reversed(static_cast<std::uint32_t>(i)) ^ scramble) * 0x1p-32;
       const auto time = static_cast<float>(part(start_time + i * kStepTime));
       const double angle = 2 * M_PI * part(start_led + i * kStepLed);
-      const double radius = std::sqrt((i + 0.5) / samples);
+      const double radius = std::sqrt(part(start_led + start_time + i * kStepTime));
       const Eigen::Vector2f jitter(static_cast<float>(radius * std::cos(angle)),
                                    static_cast<float>(radius * std::sin(angle)));
       const Vector3f direction = lens.ray(at_u, at_v).cast<float>().normalized();
@@ -478,9 +500,17 @@ class StereoRenderer::Impl {
                                   const Eigen::Vector2f& jitter) {
         return sample(direction, time, jitter).light;
       };
-      view.resting[index(u, v)].light =
-          average(lens, u, v, samplesFor(need), name, light_only);
+      view.resting[index(u, v)].light = average(lens, u, v, samplesFor(need), name, light_only);
     });
+  }
+
+  /// The bits from last to first: van der Corput's sequence.
+  static std::uint32_t reversed(std::uint32_t x) {
+    x = (x >> 1 & 0x55555555U) | (x & 0x55555555U) << 1;
+    x = (x >> 2 & 0x33333333U) | (x & 0x33333333U) << 2;
+    x = (x >> 4 & 0x0f0f0f0fU) | (x & 0x0f0f0f0fU) << 4;
+    x = (x >> 8 & 0x00ff00ffU) | (x & 0x00ff00ffU) << 8;
+    return x >> 16 | x << 16;
   }
 
   int samplesFor(Need need) const {
@@ -505,7 +535,7 @@ class StereoRenderer::Impl {
       const Vector3f from =
           view.origin + resting.depth * direction + kShadowOffset * resting.normal;
       for (std::size_t led = 0; led < kLeds; ++led)
-        if (lit_[led] && resting.light.of_led[led] > 0 &&
+        if (lit_[led] && resting.light.of_led[led] > kUnseen * contrast_ &&
             movingShadow(from, leds_[led] - from, 0.5F))
           sight.shaded |= static_cast<std::uint8_t>(1U << led);
     });

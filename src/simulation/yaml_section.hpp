@@ -14,7 +14,8 @@ namespace leap_object_tracker {
 class YamlSection {
  public:
   /// @param place what a message calls this map: "'x10.yaml', section 'light'"
-  YamlSection(YAML::Node node, std::string place) : node_(std::move(node)), place_(std::move(place)) {
+  YamlSection(YAML::Node node, std::string place)
+      : node_(std::move(node)), place_(std::move(place)) {
     if (!node_.IsMap()) throw std::runtime_error(place_ + ": must be a map of keys");
   }
 

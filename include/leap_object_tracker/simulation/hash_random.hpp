@@ -5,8 +5,8 @@
 
 namespace leap_object_tracker {
 
-/// Random numbers from what they are for (seed, frame, pixel ...) instead of from their order, so that
-/// threads cannot change them. Mixing function: splitmix64 (Steele et al. 2014).
+/// Random numbers from what they are for (seed, frame, pixel ...) instead of from their order, so
+/// that threads cannot change them. Mixing function: splitmix64 (Steele et al. 2014).
 inline std::uint64_t mixed(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;

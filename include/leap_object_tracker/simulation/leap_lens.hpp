@@ -8,11 +8,11 @@ namespace leap_object_tracker {
 
 /// One eye as the Leap's memory describes it, in pixels of its 640x480 grid.
 struct LeapEyeRecord {
-  double focal_length = 0;                                   ///< [px]
-  Eigen::Vector2d center_offset = Eigen::Vector2d::Zero();   ///< [px] from (320, 240)
-  std::array<double, 6> radial{};                            ///< k1 k2 k3 over k4 k5 k6
-  std::array<double, 2> tangential{};                        ///< p1 p2
-  Eigen::Vector3d rotation_vector = Eigen::Vector3d::Zero(); ///< as stored, y up
+  double focal_length = 0;                                    ///< [px]
+  Eigen::Vector2d center_offset = Eigen::Vector2d::Zero();    ///< [px] from (320, 240)
+  std::array<double, 6> radial{};                             ///< k1 k2 k3 over k4 k5 k6
+  std::array<double, 2> tangential{};                         ///< p1 p2
+  Eigen::Vector3d rotation_vector = Eigen::Vector3d::Zero();  ///< as stored, y up
 };
 
 /// One device.

@@ -37,7 +37,7 @@ class AutoExposure {
   explicit AutoExposure(double longest_exposure_us) : longest_exposure_us_(longest_exposure_us) {}
 
   /// Takes a frame that was made with `controls`. @return what to set for the next one.
-  SensorControls after(const cv::Mat& left, const SensorControls& controls);
+  SensorControls after(const cv::Mat& left, const cv::Mat& right, const SensorControls& controls);
 
  private:
   double longest_exposure_us_;

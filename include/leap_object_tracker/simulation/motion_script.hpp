@@ -28,8 +28,8 @@ struct MotionScript {
   };
   /// A pose relative to the rest pose; between two of them the body starts and stops softly.
   struct Keyframe {
-    double time = 0;                                               ///< [s]
-    Eigen::Vector3d offset = Eigen::Vector3d::Zero();              ///< [m]
+    double time = 0;                                   ///< [s]
+    Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< [m]
     Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
   };
 

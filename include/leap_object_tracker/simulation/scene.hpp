@@ -31,8 +31,8 @@ enum class FrameTiming {
 };
 
 struct LightParams {
-  double power = 0.0043;     ///< [1/us at 1 m] counts of white paint, one LED, gain 1
-  double ambient = 0.004;    ///< [1/us] counts of white paint, gain 1
+  double power = 0.0043;       ///< [1/us at 1 m] counts of white paint, one LED, gain 1
+  double ambient = 0.004;      ///< [1/us] counts of white paint, gain 1
   double lobe_exponent = 0.8;  ///< an LED sends cos^n of the angle from its axis
 };
 
@@ -48,18 +48,18 @@ struct SensorControls {
 
 struct SensorParams {
   bool auto_exposure = true;
-  double full_well = 9000;     ///< [e-] at 255 counts and gain 1
-  double read_noise = 1.2;     ///< [counts] at gain 1, one row
-  double fixed_noise = 0.3;    ///< [counts] the same in every frame
-  double dark_offset = 2.5;    ///< [counts]
-  double lens_blur = 0.35;     ///< [px of the 480-row grid] standard deviation
-  double vignetting = 1.5;     ///< falls off with cos^n of the angle from the axis
-  double glow = 0.05;          ///< [counts/us] stray light of the LEDs at the side borders
-  double pulse_limit_us = 511; ///< longest exposure of the automatic control
+  double full_well = 9000;      ///< [e-] at 255 counts and gain 1
+  double read_noise = 1.2;      ///< [counts] at gain 1, one row
+  double fixed_noise = 0.3;     ///< [counts] the same in every frame
+  double dark_offset = 2.5;     ///< [counts]
+  double lens_blur = 0.35;      ///< [px of the 480-row grid] standard deviation
+  double vignetting = 1.5;      ///< falls off with cos^n of the angle from the axis
+  double glow = 0.05;           ///< [counts/us] stray light of the LEDs at the side borders
+  double pulse_limit_us = 511;  ///< longest exposure of the automatic control
 };
 
-/// All that a simulated sequence is made of. The parent of all is the scene frame: at rest it is the
-/// left rectified optical frame (x right, y down, z forward).
+/// All that a simulated sequence is made of. The parent of all is the scene frame: at rest it is
+/// the left rectified optical frame (x right, y down, z forward).
 struct Scene {
   std::string name;
   std::uint64_t seed = 1;
@@ -74,7 +74,7 @@ struct Scene {
   std::string object_path;
   std::vector<SceneBody> bodies;  ///< the first one is the object
   MotionScript camera_motion;     ///< scene_from_camera
-  int samples = 16;               ///< rays for a pixel on an edge
+  int samples = 32;               ///< rays for a pixel on an edge; a quarter on texture
 };
 
 /// What may be said differently from the file.

@@ -12,7 +12,7 @@ namespace leap_object_tracker {
 
 /// Where a body is while the shutter is open.
 struct BodyPath {
-  Pose camera_from_body_at_open;   ///< left rectified optical frame from body
+  Pose camera_from_body_at_open;  ///< left rectified optical frame from body
   Pose camera_from_body_at_close;
 };
 
