@@ -83,10 +83,10 @@ visualization_msgs::MarkerArrayPtr meshMessage(const ObjectModel& object,
   marker.action = shown ? visualization_msgs::Marker::ADD : visualization_msgs::Marker::DELETE;
   marker.pose.orientation.w = 1;
   marker.scale.x = marker.scale.y = marker.scale.z = 1;
-  marker.color.r = 0.2F;
-  marker.color.g = 0.9F;
-  marker.color.b = 0.3F;
-  marker.color.a = 0.5F;
+  marker.color.r = 0.4F;
+  marker.color.g = 1.0F;
+  marker.color.b = 0.5F;
+  marker.color.a = 0.7F;
   if (shown)
     for (const auto& triangle : object.mesh.triangles)
       for (const auto index : triangle) {
