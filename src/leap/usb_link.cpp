@@ -10,7 +10,7 @@ namespace leap_object_tracker {
 namespace {
 
 constexpr int kInterfaces[] = {0, 1};
-constexpr std::chrono::milliseconds kDescriptorTimeout{500};
+constexpr std::chrono::milliseconds kStandardTimeout{500};
 
 LeapFault faultOf(int code) {
   switch (code) {
@@ -136,9 +136,12 @@ int UsbLink::read(std::uint8_t type, std::uint8_t request, std::uint16_t value, 
   return count;
 }
 
+/// As a plain request: libusb_set_interface_alt_setting of libusb 1.0.26 keeps a lock when it finds
+/// the device gone, and libusb_close then stops the program.
 void UsbLink::selectInterface(int interface_number) {
-  const int code = libusb_set_interface_alt_setting(handle_, interface_number, 0);
-  if (code != LIBUSB_SUCCESS) fail(code, "selecting the streaming interface");
+  const int code = write(LIBUSB_RECIPIENT_INTERFACE, LIBUSB_REQUEST_SET_INTERFACE, 0,
+                         static_cast<std::uint16_t>(interface_number), {}, kStandardTimeout);
+  if (code < 0) fail(code, "selecting the streaming interface");
 }
 
 void UsbLink::clearHalt(std::uint8_t endpoint) { libusb_clear_halt(handle_, endpoint); }
@@ -151,7 +154,7 @@ void UsbLink::reset() {
 std::vector<std::uint8_t> UsbLink::configurationDescriptor() {
   std::vector<std::uint8_t> bytes(4096);
   const int count = read(LIBUSB_ENDPOINT_IN, LIBUSB_REQUEST_GET_DESCRIPTOR, LIBUSB_DT_CONFIG << 8,
-                         0, bytes, kDescriptorTimeout);
+                         0, bytes, kStandardTimeout);
   if (count < 0) bytes.clear();
   return bytes;
 }

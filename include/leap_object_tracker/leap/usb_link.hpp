@@ -73,7 +73,8 @@ class UsbLink {
   int read(std::uint8_t type, std::uint8_t request, std::uint16_t value, std::uint16_t index,
            std::vector<std::uint8_t>& data, std::chrono::milliseconds timeout);
 
-  /// Alternate setting 0 of an interface. @throw LeapError
+  /// Alternate setting 0 of an interface; clear the halt of its endpoints after, so that both sides
+  /// count packets from the start. @throw LeapError
   void selectInterface(int interface_number);
   /// Failure does not matter: a device that is not halted may refuse.
   void clearHalt(std::uint8_t endpoint);
