@@ -20,8 +20,10 @@ constexpr char kUsage[] =
     "usage: simulate_bag SCENE.yaml OUT.bag [--seed N] [--frames N] [--object FILE.yaml]\n"
     "Writes what a Leap would record of the scene: /leap/{left,right}/image_raw and camera_info, "
     "with\n"
-    "the truth: /ground_truth/pose, /ground_truth/visible (x left, y right: share of the object's\n"
-    "visible side that the eye sees), and /tf if the camera moves.\n";
+    "the truth: /ground_truth/pose, /ground_truth/NAME/pose of other known objects,\n"
+    "/ground_truth/visible (x left, y right: share of the object's visible side that the eye "
+    "sees),\n"
+    "and /tf if the camera moves.\n";
 
 struct Arguments {
   std::string scene;
@@ -81,7 +83,11 @@ void writeFrame(rosbag::Bag& bag, const SimulatedFrame& frame, sensor_msgs::Came
         transformMessage(frame.fixed_from_camera, stamp, kFixedFrame, kLeftFrame));
     bag.write("/tf", stamp, transforms);
   }
-  bag.write("/ground_truth/pose", stamp, truthMessage(frame, stamp));
+  bag.write("/ground_truth/pose", stamp, truthMessage(frame.camera_from_object, stamp));
+  for (const auto& other : frame.others)
+    if (other.is_object)
+      bag.write("/ground_truth/" + other.name + "/pose", stamp,
+                truthMessage(other.camera_from_body, stamp));
   bag.write("/ground_truth/visible", stamp, visibilityMessage(frame, stamp));
   bag.write("/leap/left/camera_info", stamp, left_info);
   bag.write("/leap/right/camera_info", stamp, right_info);

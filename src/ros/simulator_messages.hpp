@@ -73,11 +73,11 @@ inline sensor_msgs::CameraInfo cameraInfoMessage(const StereoCalibration& calibr
   return info;
 }
 
-inline geometry_msgs::PoseStamped truthMessage(const SimulatedFrame& frame,
+inline geometry_msgs::PoseStamped truthMessage(const Pose& camera_from_body,
                                                const ros::Time& stamp) {
   geometry_msgs::PoseStamped message;
   message.header = headerOf(stamp, kLeftFrame);
-  message.pose = tf2::toMsg(frame.camera_from_object);
+  message.pose = tf2::toMsg(camera_from_body);
   return message;
 }
 

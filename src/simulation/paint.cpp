@@ -67,7 +67,7 @@ float pattern(const Paint& paint, const Eigen::Vector3f& p) {
              0.1F * valueNoise(paint.seed + 2, 4.3F * p);
     case PaintKind::kBlobs: {
       const float level = uniformOf(mixed(nearestCell(paint.seed, p), 3));
-      return level < 0.4F ? 1 : level < 0.75F ? 0 : 0.55F;
+      return level < 0.55F ? 1 : level < 0.75F ? 0 : 0.55F;
     }
   }
   return 1;

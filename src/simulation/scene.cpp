@@ -222,6 +222,7 @@ SceneBody readBody(YamlSection section, std::uint64_t seed) {
     std::string path;
     section.read("file", path, "the path of an object file");
     body.mesh = loadObject(path).mesh;
+    body.is_object = true;
   } else {
     body.mesh = readInlineShape(section);
   }
@@ -301,6 +302,7 @@ Scene loadScene(const std::string& path, const SceneOverrides& overrides) {
   SceneBody target;
   target.name = scene.object.name;
   target.mesh = scene.object.mesh;
+  target.is_object = true;
   readLook(object, target, mixed(scene.seed, 100));
   object.finish();
   scene.bodies.push_back(target);

@@ -75,7 +75,8 @@ class Simulator::Impl {
     frame.camera_from_object = cameraFromBody(scene_.bodies.front(), middle);
     frame.fixed_from_camera = fixedFromScene() * scene_.camera_motion.at(middle);
     for (std::size_t i = 1; i < scene_.bodies.size(); ++i)
-      frame.others.push_back({scene_.bodies[i].name, cameraFromBody(scene_.bodies[i], middle)});
+      frame.others.push_back({scene_.bodies[i].name, scene_.bodies[i].is_object,
+                              cameraFromBody(scene_.bodies[i], middle)});
     frame.left_visible = renderer_.visibleShare(0);
     frame.right_visible = renderer_.visibleShare(1);
 

@@ -269,15 +269,24 @@ class StereoRenderer::Impl {
                           1.01F * surfaces_[body].radius() + 1e-4F +
                               (path.offset_open - path.offset_close).norm()});
     }
-    blur_pixels_ = 0;
-    for (const auto body : moving) {
-      const Path& path = paths_[body];
-      const float travel = (path.offset_open - path.offset_close).norm() +
-                           surfaces_[body].radius() * (path.turn_open - path.turn_close).norm();
-      const float distance = std::max(0.02F, path.offset_open.norm() - surfaces_[body].radius());
-      blur_pixels_ = std::max(
-          blur_pixels_, std::min(8, static_cast<int>(travel / distance * lenses_[0].fx() + 0.5)));
+    float widest = 0;
+    for (const auto body : moving) widest = std::max(widest, angleSwept(body));
+    constexpr int kWidest = 8;  // [px] beyond, edges are so soft that a few lost rays do not show
+    blur_pixels_ = std::min(kWidest, static_cast<int>(std::lround(widest * lenses_[0].fx())));
+  }
+
+  /// Largest angle [rad] that a corner of a body moves through while the shutter is open.
+  float angleSwept(std::uint32_t body) const {
+    const auto& vertices = surfaces_[body].vertices();
+    constexpr std::size_t kMostCorners = 200;
+    const std::size_t step = 1 + vertices.size() / kMostCorners;
+    float widest = 0;
+    for (std::size_t i = 0; i < vertices.size(); i += step) {
+      const Vector3f before = paths_[body].apply(vertices[i], 0);
+      const Vector3f after = paths_[body].apply(vertices[i], 1);
+      widest = std::max(widest, (after.normalized() - before.normalized()).norm());
     }
+    return widest;
   }
 
   static void replace(RTCScene& scene, RTCScene next) {

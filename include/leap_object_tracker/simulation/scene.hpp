@@ -17,6 +17,7 @@ struct SceneBody {
   enum class Parent { kScene, kObject };
 
   std::string name;
+  bool is_object = false;  ///< comes from an object file: something that may be tracked
   Mesh mesh;
   Paint paint;
   MotionScript motion;

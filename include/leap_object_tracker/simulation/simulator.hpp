@@ -15,6 +15,7 @@ namespace leap_object_tracker {
 struct SimulatedFrame {
   struct Body {
     std::string name;
+    bool is_object = false;  ///< comes from an object file
     Pose camera_from_body;
   };
 

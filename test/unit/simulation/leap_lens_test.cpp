@@ -7,8 +7,8 @@
 namespace leap_object_tracker {
 namespace {
 
-LeapUnit unitA() { return loadLeapUnit(SOURCE_DIR "/config/calibration/leap_unit_a.yaml"); }
-LeapUnit unitB() { return loadLeapUnit(SOURCE_DIR "/config/calibration/leap_unit_b.yaml"); }
+LeapUnit unitA() { return loadLeapUnit(LEAP_SOURCE_FOLDER "/config/calibration/leap_unit_a.yaml"); }
+LeapUnit unitB() { return loadLeapUnit(LEAP_SOURCE_FOLDER "/config/calibration/leap_unit_b.yaml"); }
 
 const SensorMode kFull = sensorMode("640x480");
 

@@ -14,7 +14,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-const std::string kScenes = SOURCE_DIR "/config/scenes";
+const std::string kScenes = LEAP_SOURCE_FOLDER "/config/scenes";
 
 class SceneFile : public ::testing::Test {
  protected:
@@ -33,9 +33,10 @@ class SceneFile : public ::testing::Test {
 
   /// A scene with all that must be there, and more lines.
   std::string sceneWith(const std::string& lines) const {
-    return write("scene.yaml", "calibration: " SOURCE_DIR
+    return write("scene.yaml", "calibration: " LEAP_SOURCE_FOLDER
                                "/config/calibration/leap_unit_a.yaml\n"
-                               "object:\n  file: " SOURCE_DIR "/config/objects/cube.yaml\n" +
+                               "object:\n  file: " LEAP_SOURCE_FOLDER
+                               "/config/objects/cube.yaml\n" +
                                    lines);
   }
 
@@ -65,13 +66,13 @@ TEST(Config, everySceneLoads) {
 }
 
 TEST(Config, everyObjectLoads) {
-  const auto files = yamlFilesIn(SOURCE_DIR "/config/objects");
+  const auto files = yamlFilesIn(LEAP_SOURCE_FOLDER "/config/objects");
   ASSERT_GE(files.size(), 7U);
   for (const auto& file : files) EXPECT_GT(loadObject(file).mesh.triangles.size(), 0U) << file;
 }
 
 TEST(Config, everyCalibrationLoads) {
-  for (const auto& file : yamlFilesIn(SOURCE_DIR "/config/calibration"))
+  for (const auto& file : yamlFilesIn(LEAP_SOURCE_FOLDER "/config/calibration"))
     EXPECT_NEAR(loadLeapUnit(file).baseline, 0.04, 2e-4) << file;
 }
 
@@ -133,7 +134,7 @@ TEST_F(SceneFile, yieldsToWhatTheCallerSays) {
   overrides.frames = 4;
   overrides.has_seed = true;
   overrides.seed = 0;
-  overrides.object_path = SOURCE_DIR "/config/objects/box.yaml";
+  overrides.object_path = LEAP_SOURCE_FOLDER "/config/objects/box.yaml";
   const Scene scene = loadScene(sceneWith("seed: 9\n"), overrides);
   EXPECT_EQ(scene.frames, 4);
   EXPECT_EQ(scene.seed, 0U);

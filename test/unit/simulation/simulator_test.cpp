@@ -11,7 +11,7 @@ namespace {
 /// A bare plate of 2 x 2 x 0.02 mm in the dark, seen without noise.
 Scene plateScene(const std::string& mode) {
   Scene scene;
-  scene.unit = loadLeapUnit(SOURCE_DIR "/config/calibration/leap_unit_a.yaml");
+  scene.unit = loadLeapUnit(LEAP_SOURCE_FOLDER "/config/calibration/leap_unit_a.yaml");
   scene.mode = sensorMode(mode);
   scene.frames = 3;
   scene.object = makePrimitive("plate", Shape::kBox, {0.002, 0.002, 0.00002});
@@ -70,7 +70,7 @@ Scene noisyScene(std::uint64_t seed) {
   overrides.has_seed = true;
   overrides.seed = seed;
   overrides.frames = 3;
-  return loadScene(SOURCE_DIR "/config/scenes/wobble_cube_textured.yaml", overrides);
+  return loadScene(LEAP_SOURCE_FOLDER "/config/scenes/wobble_cube_textured.yaml", overrides);
 }
 
 TEST(Simulator, showsThePlateInBothEyesWhereTheTruthPutsIt) {
@@ -274,7 +274,8 @@ TEST(Simulator, keepsARestingObjectInPlaceInTheFixedFrameOfAMovingCamera) {
 
 TEST(FitCalibration, describesTheLensWhereObjectsAre) {
   for (const char* file : {"leap_unit_a.yaml", "leap_unit_b.yaml", "leap_unit_a_centred.yaml"}) {
-    const LeapUnit unit = loadLeapUnit(std::string(SOURCE_DIR "/config/calibration/") + file);
+    const LeapUnit unit =
+        loadLeapUnit(std::string(LEAP_SOURCE_FOLDER "/config/calibration/") + file);
     const FittedCalibration fitted = fitCalibration(unit, sensorMode("640x240"));
     EXPECT_LT(fitted.left_rms, 0.3) << file;
     EXPECT_LT(fitted.right_rms, 0.3) << file;
@@ -282,7 +283,8 @@ TEST(FitCalibration, describesTheLensWhereObjectsAre) {
 }
 
 TEST(FitCalibration, isExactForALensWithoutTangentialTerms) {
-  const LeapUnit unit = loadLeapUnit(SOURCE_DIR "/config/calibration/leap_unit_a_centred.yaml");
+  const LeapUnit unit =
+      loadLeapUnit(LEAP_SOURCE_FOLDER "/config/calibration/leap_unit_a_centred.yaml");
   const SensorMode mode = sensorMode("640x240");
   const StereoCalibration calibration = fitCalibration(unit, mode).calibration;
   const LeapLens lens(unit.right, mode);
