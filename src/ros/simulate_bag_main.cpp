@@ -1,4 +1,3 @@
-#include <ros/time.h>
 #include <rosbag/bag.h>
 #include <tf2_msgs/TFMessage.h>
 #include <unistd.h>
@@ -7,80 +6,38 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
+#include "command_line.hpp"
+#include "conversions.hpp"
 #include "simulator_messages.hpp"
 
 namespace leap_object_tracker {
 namespace {
 
-constexpr char kUsage[] =
-    "usage: simulate_bag SCENE.yaml OUT.bag [--seed N] [--frames N] [--object FILE.yaml]\n"
-    "Writes what a Leap would record of the scene: /leap/{left,right}/image_raw and camera_info, "
-    "with\n"
-    "the truth: /ground_truth/pose, /ground_truth/NAME/pose of other known objects,\n"
-    "/ground_truth/visible (x left, y right: share of the object's visible side that the eye "
-    "sees),\n"
-    "and /tf if the camera moves.\n";
+constexpr char kUsage[] = R"(usage: simulate_bag SCENE.yaml OUT.bag [options]
 
-struct Arguments {
-  std::string scene;
-  std::string bag;
-  SceneOverrides overrides;
-};
+Writes what a Leap would record of a scene (config/scenes): /leap/{left,right}/image_raw and
+camera_info, and the truth about it: /ground_truth/pose of the object in the left rectified optical
+frame, /ground_truth/NAME/pose of other known objects, /ground_truth/visible (x left, y right: share
+of the object's visible side that the eye sees), and /tf if the camera moves.
 
-long wholeNumber(const std::string& option, const std::string& text, long least) {
-  std::size_t used = 0;
-  long value = 0;
-  try {
-    value = std::stol(text, &used);
-  } catch (const std::exception&) {
-    used = 0;
-  }
-  if (used == 0 || used != text.size() || value < least)
-    throw std::invalid_argument(option + " '" + text + "': expected a whole number, at least " +
-                                std::to_string(least));
-  return value;
-}
+  --seed N            instead of the scene's
+  --frames N          instead of the scene's
+  --object FILE.yaml  instead of the scene's
+)";
 
-Arguments parse(const std::vector<std::string>& words) {
-  Arguments arguments;
-  std::vector<std::string> files;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    const std::string& word = words[i];
-    if (word.rfind("--", 0) != 0) {
-      files.push_back(word);
-      continue;
-    }
-    if (i + 1 == words.size()) throw std::invalid_argument(word + " needs a value");
-    const std::string& value = words[++i];
-    if (word == "--seed") {
-      arguments.overrides.seed = static_cast<std::uint64_t>(wholeNumber(word, value, 0));
-      arguments.overrides.has_seed = true;
-    } else if (word == "--frames") {
-      arguments.overrides.frames = static_cast<int>(wholeNumber(word, value, 1));
-    } else if (word == "--object") {
-      arguments.overrides.object_path = value;
-    } else {
-      throw std::invalid_argument("unknown option " + word);
-    }
-  }
-  if (files.size() != 2) throw std::invalid_argument("expected a scene and a bag");
-  arguments.scene = files[0];
-  arguments.bag = files[1];
-  return arguments;
-}
+const std::map<std::string, int> kOptions{{"seed", 1}, {"frames", 1}, {"object", 1}, {"help", 0}};
 
 void writeFrame(rosbag::Bag& bag, const SimulatedFrame& frame, sensor_msgs::CameraInfo left_info,
                 sensor_msgs::CameraInfo right_info, bool camera_moves) {
-  const ros::Time stamp = rosTime(frame.raw.stamp);
+  const ros::Time stamp = timeFrom(frame.raw.stamp);
   left_info.header.stamp = right_info.header.stamp = stamp;
   if (camera_moves) {
     tf2_msgs::TFMessage transforms;
-    transforms.transforms.push_back(
-        transformMessage(frame.fixed_from_camera, stamp, kFixedFrame, kLeftFrame));
+    transforms.transforms.push_back(cameraTransform(frame, stamp));
     bag.write("/tf", stamp, transforms);
   }
   bag.write("/ground_truth/pose", stamp, truthMessage(frame.camera_from_object, stamp));
@@ -91,26 +48,17 @@ void writeFrame(rosbag::Bag& bag, const SimulatedFrame& frame, sensor_msgs::Came
   bag.write("/ground_truth/visible", stamp, visibilityMessage(frame, stamp));
   bag.write("/leap/left/camera_info", stamp, left_info);
   bag.write("/leap/right/camera_info", stamp, right_info);
-  bag.write("/leap/left/image_raw", stamp,
-            imageMessage(frame.raw.left, headerOf(stamp, kLeftFrame)));
-  bag.write("/leap/right/image_raw", stamp,
-            imageMessage(frame.raw.right, headerOf(stamp, kRightFrame)));
+  bag.write("/leap/left/image_raw", stamp, simulatedImage(frame.raw.left, stamp, false));
+  bag.write("/leap/right/image_raw", stamp, simulatedImage(frame.raw.right, stamp, true));
 }
 
-void run(const Arguments& arguments) {
-  const Scene scene = loadScene(arguments.scene, arguments.overrides);
-  const FittedCalibration fitted = fitCalibration(scene.unit, scene.mode);
-  std::cout << "camera_info fits the lens of " << scene.unit.name << " to " << fitted.left_rms
-            << " / " << fitted.right_rms << " px rms (largest " << fitted.left_largest << " / "
-            << fitted.right_largest << ") in the central 100 deg, left / right\n";
-  const auto left_info = cameraInfoMessage(fitted.calibration, false);
-  const auto right_info = cameraInfoMessage(fitted.calibration, true);
-
+/// All frames of the scene. @return how many
+int writeBag(const Scene& scene, const FittedCalibration& fitted, const std::string& path) {
+  const auto left_info = simulatedCameraInfo(fitted.calibration, false);
+  const auto right_info = simulatedCameraInfo(fitted.calibration, true);
   Simulator simulator(scene);
-  const std::string unfinished = arguments.bag + ".unfinished";
-  rosbag::Bag bag(unfinished, rosbag::bagmode::Write);
+  rosbag::Bag bag(path, rosbag::bagmode::Write);
   bag.setCompression(rosbag::compression::BZ2);
-  const auto begin = std::chrono::steady_clock::now();
   const bool on_terminal = isatty(STDERR_FILENO) != 0;
   int frames = 0;
   while (const auto frame = simulator.next()) {
@@ -118,37 +66,55 @@ void run(const Arguments& arguments) {
     ++frames;
     if (on_terminal) std::fprintf(stderr, "\r%d of %d frames", frames, scene.frames);
   }
-  if (on_terminal) std::fprintf(stderr, "\r");
+  if (on_terminal) std::fputs("\r", stderr);
   bag.close();
-  std::filesystem::rename(unfinished, arguments.bag);
+  return frames;
+}
+
+int run(int argc, char** argv) {
+  const CommandLine line(argc, argv, kOptions);
+  if (line.has("help")) {
+    std::cout << kUsage;
+    return 0;
+  }
+  if (line.positional().size() != 2) throw UsageError("expected a scene and a bag");
+  const std::string& bag = line.positional()[1];
+  SceneOverrides overrides;
+  overrides.object_path = line.text("object");
+  if (line.has("frames"))
+    overrides.frames = static_cast<int>(line.wholeNumber("frames", 1, 1000000));
+  if (line.has("seed")) {
+    overrides.has_seed = true;
+    overrides.seed = static_cast<std::uint64_t>(
+        line.wholeNumber("seed", 0, std::numeric_limits<long long>::max()));
+  }
+  const Scene scene = loadScene(line.positional()[0], overrides);
+  const FittedCalibration fitted = fitCalibration(scene.unit, scene.mode);
+  std::printf("camera_info fits the lens of %s to %.3f / %.3f px rms in the central 100 deg\n",
+              scene.unit.name.c_str(), fitted.left_rms, fitted.right_rms);
+
+  const auto begin = std::chrono::steady_clock::now();
+  const std::string unfinished = bag + ".unfinished";
+  const int frames = writeBag(scene, fitted, unfinished);
+  std::filesystem::rename(unfinished, bag);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
-  std::cout << arguments.bag << ": " << frames << " frames of " << scene.name << ", seed "
-            << scene.seed << ", " << std::filesystem::file_size(arguments.bag) / 1e6 << " MB, "
-            << elapsed.count() << " s\n";
+  std::printf("%s: %d frames of %s, seed %llu, %.1f MB, %.1f s\n", bag.c_str(), frames,
+              scene.name.c_str(), static_cast<unsigned long long>(scene.seed),
+              static_cast<double>(std::filesystem::file_size(bag)) / 1e6, elapsed.count());
+  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  using namespace leap_object_tracker;
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  if (words.size() == 1 && (words[0] == "--help" || words[0] == "-h")) {
-    std::cout << kUsage;
-    return 0;
-  }
-  Arguments arguments;
   try {
-    arguments = parse(words);
-  } catch (const std::invalid_argument& error) {
-    std::cerr << "simulate_bag: " << error.what() << "\n" << kUsage;
+    return leap_object_tracker::run(argc, argv);
+  } catch (const leap_object_tracker::UsageError& error) {
+    std::cerr << "simulate_bag: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
     return 2;
-  }
-  try {
-    run(arguments);
   } catch (const std::exception& error) {
     std::cerr << "simulate_bag: " << error.what() << "\n";
     return 1;
   }
-  return 0;
 }
