@@ -51,6 +51,7 @@ LeapDevice::LeapDevice(UsbContext& context, const std::string& serial, bool rese
   if (leaps.empty())
     throw LeapError(LeapFault::kAbsent,
                     "no Leap Motion (USB f182:0003) on the bus; plug it in, or check the cable");
+  context.forgetAbsent(leaps);
   std::optional<LeapError> refusal;
   std::string others;
   for (const UsbDevice& leap : leaps) {

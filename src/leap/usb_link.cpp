@@ -91,6 +91,15 @@ std::vector<UsbDevice> UsbContext::leaps() const {
   return found;
 }
 
+void UsbContext::forgetAbsent(const std::vector<UsbDevice>& present) {
+  std::map<int, std::string> known;
+  for (const UsbDevice& device : present) {
+    const auto serial = serials.find(device.number());
+    if (serial != serials.end()) known.insert(*serial);
+  }
+  serials.swap(known);
+}
+
 UsbLink::UsbLink(const UsbContext& context, const UsbDevice& device)
     : context_(context), location_(device.location()) {
   if (!device.isFast())

@@ -1,7 +1,6 @@
 #include "emulated_leap.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 
@@ -55,39 +54,6 @@ const Bytes& noiseTable() {
 
 }  // namespace
 
-Bytes fromHex(const std::string& text) {
-  Bytes bytes;
-  std::string digits;
-  for (const char c : text)
-    if (std::isxdigit(static_cast<unsigned char>(c))) digits += c;
-  for (std::size_t i = 0; i + 1 < digits.size(); i += 2)
-    bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(i, 2), nullptr, 16)));
-  return bytes;
-}
-
-Bytes calibrationOfUnitA() {
-  return fromHex(
-      "434100885ecfc7511d0b2042363653bec1900443b052c9c045dbf0c0d58c1c39f9d5003be5d0a23facad983e97ff"
-      "903c5a64bb3fe9b7af3e9eb5dbbb61c60043f2c6bcc03cb5adc025eb2fbb1526bdbb55df93b964b003438e434fc1"
-      "e20848c05da6153a33cf1c3ae5d0a23facad983e97ff903c5a64bb3fe9b7af3e9eb5dbbb61c60043696e62c13cb5"
-      "adc0917901bb438fe13aab3a8e3991e6791f");
-}
-
-Bytes calibrationOfUnitB() {
-  return fromHex(
-      "43410087506a4c51dd5a2042660c293dbbe70543279c0ebf3f9d89401588323ab1a25abbe5d0a23facad983e97ff"
-      "903c5a64bb3fe9b7af3e9eb5dbbb585d034334212a4078df9c4065cbb6b9c6fe73bb6efa85bb3aee0543619a703f"
-      "9a84ca40f6490e3adcac8cbbe5d0a23facad983e97ff903c5a64bb3fe9b7af3e9eb5dbbb585d034349028a4078df"
-      "9c401ca8a5bba381cdba3098853b7b26629d");
-}
-
-Bytes withChecksum(Bytes calibration) {
-  std::uint32_t sum = 0;
-  for (std::size_t i = 0; i + 4 < calibration.size(); i += 4) sum += get32(&calibration[i]);
-  put32(&calibration[calibration.size() - 4], sum);
-  return calibration;
-}
-
 EmulatedLeap::EmulatedLeap() : memory_(256, 0), picture_(&EmulatedLeap::noise) {
   setSerial("LP10000000001");
   setCalibration(calibrationOfUnitA());
@@ -134,9 +100,7 @@ void EmulatedLeap::setFourByteControls(bool only) {
   four_byte_controls_ = only;
 }
 
-Bytes EmulatedLeap::deviceDescriptor() {
-  return fromHex("12010002ef02014082f10300000001020001");
-}
+Bytes EmulatedLeap::deviceDescriptor() { return fromHex("12010002ef02014082f10300000001020001"); }
 
 Bytes EmulatedLeap::configurationDescriptor() {
   return fromHex(
@@ -454,8 +418,7 @@ EmulatedLeap::Clock::time_point EmulatedLeap::produce(Clock::time_point now, boo
     return now + kIdle;
   }
   const int payloads = static_cast<int>((2 * mode.size.area() + kPixelBytes - 1) / kPixelBytes);
-  auto period = std::chrono::nanoseconds(
-      static_cast<std::int64_t>(100.0 * mode.interval / rate_));
+  auto period = std::chrono::nanoseconds(static_cast<std::int64_t>(100.0 * mode.interval / rate_));
   period = std::max(period, std::chrono::nanoseconds(settings_.exposure_us * 1000LL + 500000));
   if (frame_start_ == Clock::time_point()) frame_start_ = now - period;
   for (;;) {
@@ -528,9 +491,8 @@ std::uint32_t EmulatedLeap::numberInNoise(const cv::Mat& left) { return get32(le
 Bytes EmulatedLeap::metadataOf(const Frame& frame) {
   const int exposure = frame.settings.exposure_us, gain = frame.settings.analog_gain;
   const int label1 = frame.lit ? 1 : 0;
-  const int samples[6] = {0x78, 0,
-                          0,    label1 << 4 | (exposure >> 5 & 0x0f),
-                          exposure & 0x1f, gain & 0x1f};
+  const int samples[6] = {0x78,       0, 0, label1 << 4 | (exposure >> 5 & 0x0f), exposure & 0x1f,
+                          gain & 0x1f};
   Bytes bytes;
   for (const int sample : samples) bytes.insert(bytes.end(), 2, static_cast<std::uint8_t>(sample));
   return bytes;

@@ -12,20 +12,13 @@
 #include <string>
 #include <vector>
 
+#include "emulated_leap_calibration.hpp"
+
 namespace leap_object_tracker {
 
-using Bytes = std::vector<std::uint8_t>;
-
-/// Bytes of hexadecimal text; blanks are ignored.
-Bytes fromHex(const std::string& text);
-/// Calibrations of two real units.
-Bytes calibrationOfUnitA();
-Bytes calibrationOfUnitB();
-/// Puts the right checksum at the end of a calibration.
-Bytes withChecksum(Bytes calibration);
-
-/// The Leap Motion of firmware 1.7.1 as a state machine: descriptors, controls, memory, and a stream of
-/// payloads. Knows nothing of how it is attached. All functions may be called from any thread.
+/// The Leap Motion of firmware 1.7.1 as a state machine: descriptors, controls, memory, and a
+/// stream of payloads. Knows nothing of how it is attached. All functions may be called from any
+/// thread.
 class EmulatedLeap {
  public:
   using Clock = std::chrono::steady_clock;

@@ -15,6 +15,7 @@
 namespace leap_object_tracker {
 namespace {
 
+constexpr int kFirstAddress = 2, kLastAddress = 127;
 constexpr char kPreload[] = "libumockdev-preload.so.0";
 
 void prepend(const char* variable, const std::string& value, const char* separator) {
@@ -66,7 +67,8 @@ void EmulatedBus::Port::plug(EmulatedLeap& leap, bool announce) {
   leap.powerOn();
   usbfs_ = std::make_shared<EmulatedUsbfs>(leap, [this](bool readable) { setReadable(readable); });
   usbfs_->setFastLink(!slow_);
-  const int address = bus_.next_address_++;
+  const int address = bus_.next_address_;
+  bus_.next_address_ = address == kLastAddress ? kFirstAddress : address + 1;
   const std::string name = "1-" + std::to_string(number_);
   // Without DEVTYPE libusb does not look at the device yet.
   gchar* path = umockdev_testbed_add_device(

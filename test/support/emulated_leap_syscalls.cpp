@@ -1,6 +1,7 @@
-// The system calls that libusb makes on the device file of an emulated Leap. A symbol of the program
-// is found before those of any library, so libusb's calls come here; what does not concern an
-// emulated device goes on to the next library that has the function. One program links this once.
+// The system calls that libusb makes on the device file of an emulated Leap. A symbol of the
+// program is found before those of any library, so libusb's calls come here; what does not concern
+// an emulated device goes on to the next library that has the function. One program links this
+// once.
 #include <dlfcn.h>
 #include <poll.h>
 #include <sys/ioctl.h>

@@ -249,8 +249,7 @@ void EmulatedUsbfs::serve() {
       if (status == 0 && is_short && (urb->flags & USBDEVFS_URB_SHORT_NOT_OK)) status = -EREMOTEIO;
       finish(urb, status);
       const bool ends_chain =
-          status < 0 &&
-          (urb->flags & (USBDEVFS_URB_BULK_CONTINUATION | USBDEVFS_URB_SHORT_NOT_OK));
+          status < 0 && (urb->flags & (USBDEVFS_URB_BULK_CONTINUATION | USBDEVFS_URB_SHORT_NOT_OK));
       if (ends_chain) {
         while (!bulk_.empty() && (bulk_.front()->flags & USBDEVFS_URB_BULK_CONTINUATION)) {
           finish(bulk_.front(), -ECONNRESET);
@@ -402,7 +401,8 @@ bool EmulatedFiles::isDenied(const char* path) {
   const std::string text(path);
   const std::lock_guard<std::mutex> lock(mutex_);
   return std::any_of(denied_.begin(), denied_.end(), [&](const std::string& end) {
-    return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+    return text.size() >= end.size() &&
+           text.compare(text.size() - end.size(), end.size(), end) == 0;
   });
 }
 

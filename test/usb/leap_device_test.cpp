@@ -321,53 +321,119 @@ EmulatedLeap::Tamper inFrame10(int payload, std::function<Out(Bytes)> change) {
 
 INSTANTIATE_TEST_SUITE_P(
     Each, DamagedFrames,
-    testing::Values(
-        Damage{"lost", inFrame10(5, [](Bytes) { return Out{}; }), 10},
-        Damage{"lostFirst", inFrame10(0, [](Bytes) { return Out{}; }), 10},
-        Damage{"lostEnd", inFrame10(18, [](Bytes) { return Out{}; }), 10},
-        Damage{"short", inFrame10(7, [](Bytes b) { b.resize(1000); return Out{b}; }), 10},
-        Damage{"onlyHeader", inFrame10(7, [](Bytes b) { b.resize(12); return Out{b}; }), 10},
-        Damage{"long", inFrame10(7, [](Bytes b) { b.resize(16383, 9); return Out{b}; }), 10},
-        Damage{"tooLongForTheTransfer",
-               inFrame10(7, [](Bytes b) { b.resize(20000, 9); return Out{b}; }), 10},
-        Damage{"errorBit", inFrame10(3, [](Bytes b) { b[1] |= 0x40; return Out{b}; }), 10},
-        Damage{"badHeaderLength", inFrame10(3, [](Bytes b) { b[0] = 255; return Out{b}; }), 10},
-        Damage{"headerTooLong", inFrame10(18, [](Bytes b) { b.resize(5); return Out{b}; }), 10},
-        Damage{"noEndOfHeader", inFrame10(3, [](Bytes b) { b[1] &= 0x7f; return Out{b}; }), 10},
-        Damage{"timeJumpsInTheFrame", inFrame10(3, [](Bytes b) { b[3] ^= 0xff; return Out{b}; }),
-               10},
-        Damage{"repeated", inFrame10(6, [](Bytes b) { return Out{b, b}; }), -1},
-        Damage{"repeatedEnd", inFrame10(18, [](Bytes b) { return Out{b, b}; }), -1},
-        Damage{"empty", inFrame10(6, [](Bytes b) { return Out{{}, b}; }), -1},
-        Damage{"headerOfTwoBytes",
-               [](const EmulatedLeap::Payload& p) {
-                 Bytes b = p.bytes;
-                 b.erase(b.begin() + 2, b.begin() + 12);
-                 b[0] = 2, b[1] &= 0xf3;
-                 return Out{b};
-               },
-               -1},
-        Damage{"frameIdStuck",
-               [](const EmulatedLeap::Payload& p) {
-                 Bytes b = p.bytes;
-                 b[1] &= 0xfe;
-                 return Out{b};
-               },
-               -1},
-        Damage{"oneLostAndOneRepeated",
-               [](const EmulatedLeap::Payload& p) {
-                 if (p.frame == 10 && p.number == 4) return Out{};
-                 if (p.frame == 10 && p.number == 9) return Out{p.bytes, p.bytes};
-                 return Out{p.bytes};
-               },
-               10},
-        Damage{"frameIdStuckAndEndLost",
-               [](const EmulatedLeap::Payload& p) {
-                 Bytes b = p.bytes;
-                 b[1] &= 0xfe;
-                 return p.frame == 10 && p.last ? Out{} : Out{b};
-               },
-               10}),
+    testing::Values(Damage{"lost", inFrame10(5, [](Bytes) { return Out{}; }), 10},
+                    Damage{"lostFirst", inFrame10(0, [](Bytes) { return Out{}; }), 10},
+                    Damage{"lostEnd", inFrame10(18, [](Bytes) { return Out{}; }), 10},
+                    Damage{"short",
+                           inFrame10(7,
+                                     [](Bytes b) {
+                                       b.resize(1000);
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"onlyHeader",
+                           inFrame10(7,
+                                     [](Bytes b) {
+                                       b.resize(12);
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"long",
+                           inFrame10(7,
+                                     [](Bytes b) {
+                                       b.resize(16383, 9);
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"tooLongForTheTransfer",
+                           inFrame10(7,
+                                     [](Bytes b) {
+                                       b.resize(20000, 9);
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"errorBit",
+                           inFrame10(3,
+                                     [](Bytes b) {
+                                       b[1] |= 0x40;
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"badHeaderLength",
+                           inFrame10(3,
+                                     [](Bytes b) {
+                                       b[0] = 255;
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"headerTooLong",
+                           inFrame10(18,
+                                     [](Bytes b) {
+                                       b.resize(5);
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"noEndOfHeader",
+                           inFrame10(3,
+                                     [](Bytes b) {
+                                       b[1] &= 0x7f;
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"timeJumpsInTheFrame",
+                           inFrame10(3,
+                                     [](Bytes b) {
+                                       b[3] ^= 0xff;
+                                       return Out{b};
+                                     }),
+                           10},
+                    Damage{"repeated",
+                           inFrame10(6,
+                                     [](Bytes b) {
+                                       return Out{b, b};
+                                     }),
+                           -1},
+                    Damage{"repeatedEnd",
+                           inFrame10(18,
+                                     [](Bytes b) {
+                                       return Out{b, b};
+                                     }),
+                           -1},
+                    Damage{"empty",
+                           inFrame10(6,
+                                     [](Bytes b) {
+                                       return Out{{}, b};
+                                     }),
+                           -1},
+                    Damage{"headerOfTwoBytes",
+                           [](const EmulatedLeap::Payload& p) {
+                             Bytes b = p.bytes;
+                             b.erase(b.begin() + 2, b.begin() + 12);
+                             b[0] = 2, b[1] &= 0xf3;
+                             return Out{b};
+                           },
+                           -1},
+                    Damage{"frameIdStuck",
+                           [](const EmulatedLeap::Payload& p) {
+                             Bytes b = p.bytes;
+                             b[1] &= 0xfe;
+                             return Out{b};
+                           },
+                           -1},
+                    Damage{"oneLostAndOneRepeated",
+                           [](const EmulatedLeap::Payload& p) {
+                             if (p.frame == 10 && p.number == 4) return Out{};
+                             if (p.frame == 10 && p.number == 9) return Out{p.bytes, p.bytes};
+                             return Out{p.bytes};
+                           },
+                           10},
+                    Damage{"frameIdStuckAndEndLost",
+                           [](const EmulatedLeap::Payload& p) {
+                             Bytes b = p.bytes;
+                             b[1] &= 0xfe;
+                             return p.frame == 10 && p.last ? Out{} : Out{b};
+                           },
+                           10}),
     [](const auto& info) { return info.param.name; });
 
 TEST_F(LeapDeviceTest, goesOnAfterAHalt) {
@@ -422,8 +488,7 @@ TEST_F(LeapDeviceTest, noticesThatItWasUnpluggedWhileStreaming) {
 TEST_F(LeapDeviceTest, noticesThatItWasUnpluggedWhileIdle) {
   auto device = open();
   port().unplug();
-  EXPECT_EQ(LeapFault::kUnplugged,
-            faultOf([&] { device->start(mode(LeapMode::k640x240), {}); }));
+  EXPECT_EQ(LeapFault::kUnplugged, faultOf([&] { device->start(mode(LeapMode::k640x240), {}); }));
 }
 
 TEST_F(LeapDeviceTest, noticesThatItWasUnpluggedDuringAControlRequest) {

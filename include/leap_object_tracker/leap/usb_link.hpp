@@ -52,6 +52,8 @@ class UsbContext {
   /// Serial numbers by UsbDevice::number(), so that a Leap that belongs to somebody else is opened
   /// only once to ask for its name.
   std::map<int, std::string> serials;
+  /// Numbers are given again after a while.
+  void forgetAbsent(const std::vector<UsbDevice>& present);
 
  private:
   libusb_context* context_ = nullptr;
