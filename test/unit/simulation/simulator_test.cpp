@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "leap_object_tracker/rectification/stereo_rectifier.hpp"
+
 namespace leap_object_tracker {
 namespace {
 
@@ -92,6 +94,27 @@ TEST(Simulator, showsThePlateInBothEyesWhereTheTruthPutsIt) {
       EXPECT_LT((lightCenter(frame->raw.right) - frontCenter(right, right_from_plate)).norm(), 0.04)
           << mode << " at " << position.transpose();
     }
+}
+
+TEST(Simulator, agreesWithTheRectifierAboutPlaceAndDisparity) {
+  for (const char* mode : {"640x480", "640x240"}) {
+    Scene scene = plateScene(mode);
+    scene.unit = loadLeapUnit(LEAP_SOURCE_FOLDER "/config/calibration/leap_unit_a_centred.yaml");
+    scene.object = makePrimitive("plate", Shape::kBox, {0.01, 0.01, 0.00002});
+    scene.bodies.front().mesh = scene.object.mesh;
+    scene.bodies.front().paint.albedo_high = 0.3;
+    const StereoCalibration calibration = fitCalibration(scene.unit, scene.mode).calibration;
+    const RectifiedStereoCamera camera = rectifiedCamera(calibration, {});
+    const StereoRectifier rectifier(calibration, camera);
+    place(scene, {0.02, 0.01, 0.11});
+    auto frame = Simulator(scene).next();
+    for (cv::Mat* raw : {&frame->raw.left, &frame->raw.right})  // but for the metadata
+      raw->row(raw->rows - 1).setTo(0);
+    const RectifiedStereoFrame rectified = rectifier.rectify(frame->raw);
+    const Eigen::Vector3d front = frame->camera_from_object * Eigen::Vector3d(0, 0, -1e-5);
+    EXPECT_LT((lightCenter(rectified.left) - camera.leftPixel(front)).norm(), 0.12) << mode;
+    EXPECT_LT((lightCenter(rectified.right) - camera.rightPixel(front)).norm(), 0.12) << mode;
+  }
 }
 
 TEST(Simulator, blursAMovingPlateEvenlyAboutTheTruth) {
