@@ -15,8 +15,8 @@ Eigen::Matrix3d cayley(const Eigen::Vector3d& q) {
   return Eigen::Quaterniond(1, q.x(), q.y(), q.z()).normalized().toRotationMatrix();
 }
 
-LeapEyeRecord readEye(YamlSection section) {
-  LeapEyeRecord eye;
+LensRecord readEye(YamlSection section) {
+  LensRecord eye;
   section.require("focal_length", eye.focal_length, "a number of pixels");
   section.readNumber("focal_length", eye.focal_length, 50, 500, "px of the 640x480 grid");
   std::vector<double> offset, radial, tangential{0, 0};
@@ -59,7 +59,7 @@ SensorMode sensorMode(const std::string& name) {
   throw std::runtime_error("unknown sensor mode '" + name + "'; the Leap has " + list);
 }
 
-LeapLens::LeapLens(const LeapEyeRecord& record, const SensorMode& mode)
+LeapLens::LeapLens(const LensRecord& record, const SensorMode& mode)
     : mode_(mode),
       fx_(record.focal_length),
       fy_(record.focal_length / mode.rowsPerPixel()),

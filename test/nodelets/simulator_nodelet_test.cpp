@@ -92,5 +92,6 @@ TEST_F(SimulatorNodelet, refusesUnknownParameters) {
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   ros::init(argc, argv, "simulator_nodelet_test");
+  const ros::NodeHandle stays_to_the_end;  // the last one to go would end ROS and its log
   return RUN_ALL_TESTS();
 }

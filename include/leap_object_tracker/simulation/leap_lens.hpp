@@ -7,7 +7,7 @@
 namespace leap_object_tracker {
 
 /// One eye as the Leap's memory describes it, in pixels of its 640x480 grid.
-struct LeapEyeRecord {
+struct LensRecord {
   double focal_length = 0;                                    ///< [px]
   Eigen::Vector2d center_offset = Eigen::Vector2d::Zero();    ///< [px] from (320, 240)
   std::array<double, 6> radial{};                             ///< k1 k2 k3 over k4 k5 k6
@@ -19,8 +19,8 @@ struct LeapEyeRecord {
 struct LeapUnit {
   std::string name;
   double baseline = 0;  ///< [m]
-  LeapEyeRecord left;
-  LeapEyeRecord right;
+  LensRecord left;
+  LensRecord right;
 };
 
 /// Reads a file of config/calibration.
@@ -43,7 +43,7 @@ SensorMode sensorMode(const std::string& name);
 /// device stores, which acts from pixel to ray.
 class LeapLens {
  public:
-  LeapLens(const LeapEyeRecord& record, const SensorMode& mode);
+  LeapLens(const LensRecord& record, const SensorMode& mode);
 
   /// Direction (z = 1) in the eye's raw frame; pixel centres at integers.
   Eigen::Vector2d rawRay(double u, double v) const;

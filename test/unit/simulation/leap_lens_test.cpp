@@ -62,7 +62,7 @@ TEST(LeapLens, projectsPointsAsUnitsAAndBDo) {
                        {280.2456, 237.1263},
                        {347.0127, 244.2321},
                        {294.1244, 246.8967}}};
-  const auto expectPixel = [](const LeapEyeRecord& eye, const Eigen::Vector3d& point,
+  const auto expectPixel = [](const LensRecord& eye, const Eigen::Vector3d& point,
                               const Eigen::Vector2d& expected) {
     EXPECT_LT((LeapLens(eye, kFull).pixel(point) - expected).norm(), 2e-4);
   };
@@ -76,7 +76,7 @@ TEST(LeapLens, projectsPointsAsUnitsAAndBDo) {
 }
 
 TEST(LeapLens, followsTheRadialTable) {
-  LeapEyeRecord eye = unitA().left;
+  LensRecord eye = unitA().left;
   eye.tangential = {0, 0};
   const LeapLens lens(eye, kFull);
   const double table[][2] = {{0.25, 0.247216}, {0.5, 0.481825}, {1, 0.924087}, {1.5, 1.403824},
