@@ -109,6 +109,10 @@ class StereoRenderer::Impl {
     lit_ = leds;
     contrast_ = static_cast<float>(contrast);
     place(paths);
+    // What was too dark to matter at a short exposure may show at a much longer one.
+    constexpr float kFinerByFar = 0.2F;
+    if (contrast_ < kFinerByFar * resting_contrast_) resting_changed_ = true;
+    if (resting_changed_) resting_contrast_ = contrast_;
     StereoRadiance result;
     cv::Mat* const images[] = {&result.left, &result.right};
     for (std::size_t eye = 0; eye < 2; ++eye) {
@@ -589,7 +593,8 @@ class StereoRenderer::Impl {
   std::vector<std::uint32_t> resting_bodies_;
   std::vector<Sphere> spheres_;  ///< round the moving bodies
   std::array<bool, 3> lit_{};
-  float contrast_ = 0;
+  float contrast_ = 0;          ///< [counts/us] that shows
+  float resting_contrast_ = 0;  ///< the same when the resting bodies were rendered
   int blur_pixels_ = 0;
   bool resting_changed_ = true;
 };
