@@ -55,6 +55,15 @@ void setDistortion(CameraCalibration& camera, const sensor_msgs::CameraInfo& inf
   }
 }
 
+template <class Numbers>
+Eigen::Matrix3d rotationFrom(const Numbers& rows, const std::string& eye) {
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(rows.data());
+  const double error = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
+  if (!(error < 1e-3) || rotation.determinant() < 0)
+    complain(eye, "R is not a rotation: the pair is not calibrated as a stereo camera");
+  return Eigen::Quaterniond(Eigen::Matrix3d(rotation)).normalized().toRotationMatrix();
+}
+
 CameraCalibration calibrationOf(const sensor_msgs::CameraInfo& info, const std::string& eye) {
   if (info.width == 0 || info.height == 0) complain(eye, "width and height are zero");
   if (!allFinite(info.K) || !allFinite(info.D) || !allFinite(info.R) || !allFinite(info.P))
@@ -74,11 +83,25 @@ CameraCalibration calibrationOf(const sensor_msgs::CameraInfo& info, const std::
   camera.cy = (info.K[5] - info.roi.y_offset + 0.5) / bin_y - 0.5;
   setDistortion(camera, info, eye);
 
-  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(info.R.data());
-  const double error = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
-  if (!(error < 1e-3) || rotation.determinant() < 0)
-    complain(eye, "R is not a rotation: the pair is not calibrated as a stereo camera");
-  camera.rectified_from_raw = Eigen::Quaterniond(Eigen::Matrix3d(rotation)).normalized();
+  camera.rectified_from_raw = rotationFrom(info.R, eye);
+  return camera;
+}
+
+CameraCalibration calibrationOf(const LeapEyeCalibration& message, const LeapCalibration& pair,
+                                const std::string& eye) {
+  if (!allFinite(message.pixel_to_ray) || !allFinite(message.R) || !(message.fx > 0) ||
+      !(message.fy > 0) || !std::isfinite(message.cx + message.cy + message.fx + message.fy))
+    throw std::invalid_argument("calibration of the Leap, " + eye +
+                                " eye: holds numbers that are not finite, or no focal length");
+  CameraCalibration camera;
+  camera.size = cv::Size(static_cast<int>(pair.width), static_cast<int>(pair.height));
+  camera.fx = message.fx;
+  camera.fy = message.fy;
+  camera.cx = message.cx;
+  camera.cy = message.cy;
+  camera.distortion_model = DistortionModel::kLeapInverse;
+  camera.distortion.assign(message.pixel_to_ray.begin(), message.pixel_to_ray.end());
+  camera.rectified_from_raw = rotationFrom(message.R, eye);
   return camera;
 }
 
@@ -177,6 +200,20 @@ StereoCalibration calibrationFrom(const sensor_msgs::CameraInfo* left,
   calibration.left = calibrationOf(*twins.left, left != nullptr ? "left" : "right");
   calibration.right = calibrationOf(*twins.right, right != nullptr ? "right" : "left");
   calibration.baseline = twins.baseline();
+  return calibration;
+}
+
+bool holdsFor(const LeapCalibration& message, const sensor_msgs::CameraInfo& info) {
+  return message.valid != 0 && message.width == info.width && message.height == info.height;
+}
+
+StereoCalibration calibrationFrom(const LeapCalibration& message) {
+  StereoCalibration calibration;
+  calibration.baseline = message.baseline;
+  calibration.left = calibrationOf(message.left, message, "left");
+  calibration.right = calibrationOf(message.right, message, "right");
+  if (!std::isfinite(message.baseline) || !(message.baseline > 1e-5))
+    throw std::invalid_argument("calibration of the Leap: the baseline must be above zero");
   return calibration;
 }
 

@@ -2,6 +2,7 @@
 
 #include <geometry_msgs/Pose.h>
 #include <geometry_msgs/TransformStamped.h>
+#include <leap_object_tracker/LeapCalibration.h>
 #include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
@@ -30,6 +31,12 @@ Pose poseFrom(const std::string& text);
 /// that is not above zero; the message says which eye and which field.
 StereoCalibration calibrationFrom(const sensor_msgs::CameraInfo* left,
                                   const sensor_msgs::CameraInfo* right);
+
+/// Whether the exact map is the one to use for images of this camera.
+bool holdsFor(const LeapCalibration& message, const sensor_msgs::CameraInfo& info);
+
+/// The exact map of a Leap's lenses. @throw std::invalid_argument as above.
+StereoCalibration calibrationFrom(const LeapCalibration& message);
 
 /// The ideal pair that two camera_infos of rectified images describe; null as above.
 /// @throw std::invalid_argument as above, and where the pair is not rectified to one common camera.

@@ -11,7 +11,7 @@
 namespace leap_object_tracker {
 
 /// Raw pairs in (left/image_raw ...), rectified pairs out (rect/left/image_rect ...), only while
-/// somebody listens.
+/// somebody listens. The exact map on the topic `calibration` goes before camera_info.
 class RectifyNodelet : public nodelet::Nodelet {
  private:
   void onInit() override {
@@ -37,6 +37,11 @@ class RectifyNodelet : public nodelet::Nodelet {
     subscriber_ =
         std::make_unique<StereoSubscriber>(nh, private_nh, "", "image_raw", params_.eyes, getName(),
                                            [this](const StereoMessages& pair) { onPair(pair); });
+    calibration_subscriber_ = nh.subscribe<LeapCalibration>(
+        "calibration", 1, [this](const LeapCalibrationConstPtr& message) {
+          exact_ = message;
+          rectifier_.reset();
+        });
     // Listeners that came before the queue of this nodelet was open.
     late_look_ = nh.createWallTimer(ros::WallDuration(1.0),
                                     [this](const ros::WallTimerEvent&) { followListeners(); });
@@ -80,7 +85,11 @@ class RectifyNodelet : public nodelet::Nodelet {
     rectifier_.reset();
     left_info_ = pair.left_info;
     right_info_ = pair.right_info;
-    const StereoCalibration calibration = calibrationFrom(left_info_.get(), right_info_.get());
+    const auto& info = left_info_ ? left_info_ : right_info_;
+    const StereoCalibration calibration =
+        exact_ && info && holdsFor(*exact_, *info)
+            ? calibrationFrom(*exact_)
+            : calibrationFrom(left_info_.get(), right_info_.get());
     const RectifiedStereoCamera camera = rectifiedCamera(calibration, params_.rectification);
     rectifier_ = std::make_unique<StereoRectifier>(calibration, camera);
     NODELET_INFO_STREAM("rectifies " << calibration.left.size << " to " << camera.size
@@ -115,6 +124,8 @@ class RectifyNodelet : public nodelet::Nodelet {
   MessagePool<sensor_msgs::Image> images_;
   MessagePool<sensor_msgs::CameraInfo> infos_;
   std::unique_ptr<StereoRectifier> rectifier_;
+  LeapCalibrationConstPtr exact_;  ///< of a Leap that says its own
+  ros::Subscriber calibration_subscriber_;
   sensor_msgs::CameraInfoConstPtr left_info_;
   sensor_msgs::CameraInfoConstPtr right_info_;
   std::unique_ptr<StereoSubscriber> subscriber_;

@@ -61,6 +61,9 @@ void StereoBag::readCalibration() {
   camera_frame_ = left_info_.header.frame_id;
   try {
     calibration_ = calibrationFrom(left ? &*left : nullptr, right ? &*right : nullptr);
+    rosbag::View exact(bag_, rosbag::TopicQuery(topics_.calibration));
+    const auto message = exact.size() > 0 ? exact.begin()->instantiate<LeapCalibration>() : nullptr;
+    if (message && holdsFor(*message, left_info_)) calibration_ = calibrationFrom(*message);
   } catch (const std::invalid_argument& error) {
     complain(error.what());
   }

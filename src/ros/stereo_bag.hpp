@@ -21,6 +21,7 @@ struct StereoBagTopics {
   std::string right_image = "/leap/right/image_raw";
   std::string left_info = "/leap/left/camera_info";
   std::string right_info = "/leap/right/camera_info";
+  std::string calibration = "/leap/calibration";  ///< exact map, if there
   std::string truth = "/ground_truth/pose";
 };
 

@@ -42,16 +42,16 @@ format: stamp tx ty tz qx qy qz qw, the object in the left rectified optical fra
   --covariances FILE.csv  stamp and upper triangle of the covariance of every pose
   --overlay DIR           PNG of every 10th pair with the contour of the estimate
   --overlay-every N
-  --left-image, --right-image, --left-info, --right-info, --truth TOPIC
+  --left-image, --right-image, --left-info, --right-info, --calibration, --truth TOPIC
 )";
 
 const std::map<std::string, int> kOptions{
-    {"object", 1},        {"out", 1},        {"config", 1},      {"rectify", 1},
-    {"start", 1},         {"perturb", 2},    {"method", 1},      {"eyes", 1},
-    {"particles", 1},     {"threads", 1},    {"seed", 1},        {"fixed-frame", 1},
-    {"timing", 1},        {"errors", 1},     {"covariances", 1}, {"overlay", 1},
-    {"overlay-every", 1}, {"left-image", 1}, {"right-image", 1}, {"left-info", 1},
-    {"right-info", 1},    {"truth", 1},      {"help", 0}};
+    {"object", 1},        {"out", 1},         {"config", 1},      {"rectify", 1},
+    {"start", 1},         {"perturb", 2},     {"method", 1},      {"eyes", 1},
+    {"particles", 1},     {"threads", 1},     {"seed", 1},        {"fixed-frame", 1},
+    {"timing", 1},        {"errors", 1},      {"covariances", 1}, {"overlay", 1},
+    {"overlay-every", 1}, {"left-image", 1},  {"right-image", 1}, {"left-info", 1},
+    {"right-info", 1},    {"calibration", 1}, {"truth", 1},       {"help", 0}};
 
 using Clock = std::chrono::steady_clock;
 
@@ -86,6 +86,7 @@ StereoBagTopics readTopics(const CommandLine& line) {
   topics.right_image = line.text("right-image", topics.right_image);
   topics.left_info = line.text("left-info", topics.left_info);
   topics.right_info = line.text("right-info", topics.right_info);
+  topics.calibration = line.text("calibration", topics.calibration);
   topics.truth = line.text("truth", topics.truth);
   return topics;
 }

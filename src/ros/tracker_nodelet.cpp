@@ -83,7 +83,10 @@ class TrackerNodelet : public nodelet::Nodelet {
                                        pair.right ? imageFrom(*pair.right) : cv::Mat()};
       followTime(pair.header().stamp);
       const auto estimate = tracker_->track(frame, fixedFromCamera(pair.header()));
-      if (estimate) publishPose(*estimate, pair.header());
+      if (estimate) {
+        last_pose_ = estimate->camera_from_object;
+        publishPose(*estimate, pair.header());
+      }
       publishStatus(pair.header(), (ros::WallTime::now() - begin).toSec());
       publishPictures(frame, estimate, pair.header());
     } catch (const std::invalid_argument& error) {
@@ -91,16 +94,20 @@ class TrackerNodelet : public nodelet::Nodelet {
     }
   }
 
-  /// Builds the tracker for the camera of the images; a new camera begins with the last order.
+  /// Builds the tracker for the camera of the images. When the camera becomes another one, it goes
+  /// on from its pose, or else with the last order.
   void followCamera(const StereoMessages& pair) {
     const RectifiedStereoCamera camera =
         rectifiedCameraFrom(pair.left_info.get(), pair.right_info.get());
     camera_frame_ = pair.header().frame_id;
     if (tracker_ && sameCamera(camera, tracker_->camera())) return;
+    TrackerOrder order = order_;
+    if (tracker_ && tracker_->report().state == TrackerState::kTracking && last_pose_)
+      order = {TrackerOrder::Kind::kStart, *last_pose_};
     tracker_.reset();
     tracker_ = std::make_unique<Tracker>(params_.tracker, object_, camera);
     NODELET_INFO_STREAM("tracks '" << object_.name << "' in images of " << camera.size);
-    carryOut(order_);
+    carryOut(order);
   }
 
   void followTime(const ros::Time& stamp) {
@@ -211,6 +218,7 @@ class TrackerNodelet : public nodelet::Nodelet {
   ObjectModel object_;
   TrackerOrder order_;
   std::unique_ptr<Tracker> tracker_;
+  std::optional<Pose> last_pose_;
   std::string camera_frame_;
   ros::Time last_stamp_;
   ros::WallTime last_overlay_;

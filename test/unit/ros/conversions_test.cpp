@@ -108,6 +108,30 @@ TEST(CalibrationFromCameraInfo, doesWithOneEye) {
   EXPECT_THROW(calibrationFrom(nullptr, nullptr), std::invalid_argument);
 }
 
+TEST(CalibrationFromLeap, keepsTheExactMap) {
+  LeapCalibration message;
+  message.valid = 1;
+  message.width = 64;
+  message.height = 48;
+  message.baseline = 0.04;
+  for (auto* eye : {&message.left, &message.right}) {
+    eye->fx = 130;
+    eye->fy = 65;
+    eye->pixel_to_ray[0] = 1.2;
+    eye->R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  }
+  EXPECT_TRUE(holdsFor(message, smallCamera(false)));
+  const StereoCalibration calibration = calibrationFrom(message);
+  EXPECT_EQ(calibration.left.distortion_model, DistortionModel::kLeapInverse);
+  EXPECT_DOUBLE_EQ(calibration.left.distortion[0], 1.2);
+  EXPECT_DOUBLE_EQ(calibration.baseline, 0.04);
+
+  message.width = 32;
+  EXPECT_FALSE(holdsFor(message, smallCamera(false)));
+  message.right.R.fill(0);
+  EXPECT_THROW(calibrationFrom(message), std::invalid_argument);
+}
+
 TEST(RectifiedCamera, survivesTheWayThroughCameraInfo) {
   const RectifiedStereoCamera camera{130, 319.5, 239.5, 0.04, {640, 480}};
   const auto left = messageFrom(camera, false), right = messageFrom(camera, true);
