@@ -100,12 +100,6 @@ std::vector<std::pair<std::string, std::string>> picturesOf(const Strings& paths
   return pictures;
 }
 
-std::ofstream create(const std::string& path) {
-  std::ofstream file(path);
-  if (!file) throw std::runtime_error("'" + path + "': cannot be opened to write");
-  return file;
-}
-
 std::vector<CsvTable> tablesOf(const Strings& paths) {
   std::vector<CsvTable> tables;
   for (const auto& path : paths) tables.push_back(readCsv(path));
