@@ -28,6 +28,7 @@ struct ContourParams {
   double truncation = 8.0;      ///< [px] edges farther away count as no edge
   double outlier_share = 0.3;   ///< prior share of contour points that no edge supports
   double edge_sigma = 0.4;      ///< [px] noise of one sub-pixel edge
+  std::string cache_folder;     ///< views of meshes are kept here between runs; empty: nowhere
 };
 
 /// Where the object may be.

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "leap_object_tracker/geometry/object_model.hpp"
+
+namespace leap_object_tracker {
+
+/// A short piece of visible contour in the object frame.
+struct ContourPoint {
+  Eigen::Vector3f position;  ///< [m]
+  Eigen::Vector3f tangent;   ///< unit vector along the contour
+  Eigen::Vector3f outward;   ///< off the body, where only one side of the contour is body; else zero
+  float length = 0;          ///< [m] of contour that the point stands for
+
+  bool outline() const { return outward.squaredNorm() > 0.5F; }
+};
+
+/// What of the contour one view shows, hidden lines left out.
+struct ContourView {
+  /// Points for scoring, one array a coordinate: x y z [m] and the tangent times the length [m].
+  /// Each array has ContourModel::points() entries (a multiple of 16, padded with zero tangents).
+  std::vector<float> arrays;
+  /// Points for refinement, about twice as dense.
+  std::vector<ContourPoint> points;
+};
+
+/// Which view a pose shows, and how to turn the object first: the views of a cylinder are stored for
+/// one direction only.
+struct ViewChoice {
+  const ContourView* view = nullptr;  ///< nullptr: the eye is inside the body
+  float cosine = 1, sine = 0;         ///< of the turn about the object's z axis
+};
+
+/// The visible contour of an object from anywhere outside of it.
+///
+/// Convex polyhedra: exact, one view for each set of faces that look at the eye. Cylinder: exact but
+/// for the places of the two limbs, which are stored in steps of 2 deg (their images move by the
+/// square of that). Meshes: a view sphere of 642 directions times four distances, hidden lines
+/// removed with a depth buffer; outlines, self-occlusions and creases sharper than 30 deg.
+class ContourModel {
+ public:
+  /// @param points scored a view, rounded up to a multiple of 16
+  /// @param cache_folder where the views of meshes are kept between runs; empty: nowhere
+  ContourModel(const ObjectModel& object, int points, const std::string& cache_folder = "");
+  ~ContourModel();
+  ContourModel(ContourModel&&) noexcept;
+
+  /// @param eye_in_object place of the eye [m]
+  ViewChoice choose(const Eigen::Vector3f& eye_in_object) const;
+
+  /// Entries of each array of a view.
+  int points() const { return points_; }
+  /// Largest distance of the surface from the origin [m].
+  double radius() const { return radius_; }
+  int viewCount() const;
+
+  class Table;  ///< how views are stored, one kind a family of shapes
+
+ private:
+  int points_;
+  double radius_;
+  std::unique_ptr<Table> table_;
+};
+
+}  // namespace leap_object_tracker

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "leap_object_tracker/geometry/pose.hpp"
+#include "leap_object_tracker/geometry/stereo_camera.hpp"
+#include "leap_object_tracker/tracking/contour_model.hpp"
+#include "leap_object_tracker/tracking/edge_field.hpp"
+#include "leap_object_tracker/tracking/tracker_params.hpp"
+
+namespace leap_object_tracker {
+
+/// A pose moved by a twist along the fixed axes of the camera: translation added, rotation
+/// multiplied from the left.
+Pose movedInCamera(const Pose& camera_from_object, const Twist& camera_twist);
+/// The twist with movedInCamera(from, twist) == to.
+Twist cameraTwistBetween(const Pose& from, const Pose& to);
+
+/// What is known of a pose before the image speaks: a Gaussian of the camera twist about `mean`.
+struct PosePrior {
+  Pose mean = Pose::Identity();
+  Matrix6d information = Matrix6d::Zero();  ///< inverse covariance; zero: nothing is known
+};
+
+/// How one eye supports a pose.
+struct EyeSupport {
+  double visible = 0;    ///< [px] length of the contour inside the image
+  double supported = 0;  ///< [px] of it, with an edge of the right direction at the right place
+};
+
+struct RefinedPose {
+  Pose camera_from_object = Pose::Identity();
+  Matrix6d information = Matrix6d::Zero();  ///< of the image alone, of the camera twist
+  std::array<EyeSupport, 2> eyes;
+  double residual = 0;        ///< [px] robust standard deviation of the edges about the contour
+  double bright_inside = 0;   ///< share of supported outline on whose inner side the image is brighter
+  double log_likelihood = 0;  ///< sum over independent samples of the gain against chance [nats]
+
+  double support() const {
+    const double visible = eyes[0].visible + eyes[1].visible;
+    return visible > 0 ? (eyes[0].supported + eyes[1].supported) / visible : 0;
+  }
+};
+
+/// Moves a pose until its visible contour lies on sub-pixel edges of both eyes: Gauss-Newton over
+/// one-dimensional searches along the contour's normals (RAPID, Harris and Stennett 1990; moving
+/// edges, Comport et al. 2006), with Tukey weights and a Gaussian prior.
+class PoseRefiner {
+ public:
+  PoseRefiner(const ContourParams& params, const RectifiedStereoCamera& camera);
+
+  /// @param ranges [px] half length of the search of each iteration
+  RefinedPose refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
+                     const Pose& start, const PosePrior& prior, double bright_inside,
+                     const std::vector<double>& ranges) const;
+
+ private:
+  struct Match;
+  void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
+             double range, double bright_inside, std::vector<Match>& matches,
+             std::array<EyeSupport, 2>& eyes) const;
+
+  ContourParams params_;
+  RectifiedStereoCamera camera_;
+};
+
+}  // namespace leap_object_tracker

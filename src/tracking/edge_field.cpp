@@ -1,0 +1,156 @@
+#include "leap_object_tracker/tracking/edge_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace leap_object_tracker {
+namespace {
+
+constexpr int kMargin = GainMap::kMargin;
+constexpr int kStampRow = 32;  // [bytes]
+constexpr double kSmoothing = 1.0;  // [px]
+
+/// Grey levels to a scale on which shot and read noise look the same everywhere (Anscombe 1948,
+/// generalised: sqrt(x + offset)).
+const cv::Mat& varianceStabilizer() {
+  static const cv::Mat table = [] {
+    constexpr double kOffset = 6;
+    cv::Mat values(1, 256, CV_8UC1);
+    const double scale = 255 / (std::sqrt(255 + kOffset) - std::sqrt(kOffset));
+    for (int i = 0; i < 256; ++i)
+      values.at<std::uint8_t>(i) = cv::saturate_cast<std::uint8_t>(
+          scale * (std::sqrt(i + kOffset) - std::sqrt(kOffset)));
+    return values;
+  }();
+  return table;
+}
+
+/// Standard deviation of a gradient image, from its median magnitude: edges are few.
+float robustDeviation(const cv::Mat& gradient) {
+  constexpr int kBins = 256;
+  std::array<int, kBins> histogram{};
+  int count = 0;
+  for (int v = 0; v < gradient.rows; v += 2) {
+    const auto* row = gradient.ptr<std::int16_t>(v);
+    for (int u = 0; u < gradient.cols; u += 2) {
+      ++histogram[static_cast<std::size_t>(std::min(std::abs(row[u]), kBins - 1))];
+      ++count;
+    }
+  }
+  int below = 0, median = 0;
+  while (median < kBins - 1 && (below += histogram[static_cast<std::size_t>(median)]) * 2 < count)
+    ++median;
+  return static_cast<float>((median + 0.5) / 0.6745);
+}
+
+}  // namespace
+
+void EdgeField::build(const cv::Mat& image, const cv::Rect& region) {
+  edgels_.clear();
+  image_size_ = image.size();
+  region_ = region & cv::Rect(cv::Point(), image.size());
+  if (image.empty() || region_.width < 8 || region_.height < 8) {
+    smooth_.release();
+    region_ = cv::Rect();
+    return;
+  }
+  const cv::Mat view = image(region_);
+  view.convertTo(padded_, CV_16SC1, 16.0);
+  cv::GaussianBlur(padded_, smooth_, cv::Size(5, 5), kSmoothing, kSmoothing);
+
+  cv::LUT(view, varianceStabilizer(), stabilized_);
+  cv::GaussianBlur(stabilized_, stabilized_, cv::Size(5, 5), kSmoothing, kSmoothing);
+  cv::Sobel(stabilized_, du_, CV_16S, 1, 0, 3);
+  cv::Sobel(stabilized_, dv_, CV_16S, 0, 1, 3);
+
+  constexpr float kWeakest = 20;  // a step of 5 grey levels of 255 after smoothing
+  gradient_noise_ = std::max(robustDeviation(du_), robustDeviation(dv_));
+  const float high = std::max(kWeakest, 5.0F * gradient_noise_);
+  cv::Canny(du_, dv_, edges_, 0.4F * high, high, true);
+
+  for (int v = 0; v < edges_.rows; ++v) {
+    const auto* row = edges_.ptr<std::uint8_t>(v);
+    const auto *du = du_.ptr<std::int16_t>(v), *dv = dv_.ptr<std::int16_t>(v);
+    for (int u = 0; u < edges_.cols; ++u) {
+      if (row[u] == 0) continue;
+      const float degrees = cv::fastAtan2(static_cast<float>(du[u]), static_cast<float>(-dv[u]));
+      edgels_.push_back({static_cast<std::int16_t>(u + region_.x),
+                         static_cast<std::int16_t>(v + region_.y),
+                         static_cast<std::uint8_t>(static_cast<int>(degrees * (256 / 180.0F)))});
+    }
+  }
+}
+
+void EdgeField::transform(const EdgeKernel& kernel, int coarseness, GainMap& map) const {
+  map.cells_per_pixel = 1.0F / static_cast<float>(coarseness);
+  map.width = region_.width / coarseness + 2;
+  map.height = region_.height / coarseness + 2;
+  map.row_stride = (map.width + 2 * kMargin + 15) / 16 * 16;
+  map.plane_stride = map.row_stride * (map.height + 2 * kMargin);
+  // Cell 1 is the first inside; a cell's centre lies in the middle of its pixels.
+  const float middle = 0.5F * static_cast<float>(coarseness - 1);
+  map.origin_u = static_cast<float>(region_.x) + middle - static_cast<float>(coarseness);
+  map.origin_v = static_cast<float>(region_.y) + middle - static_cast<float>(coarseness);
+  map.nats_per_step = kernel.log_ratio / 127.0F;
+  map.gains.assign(static_cast<std::size_t>(GainMap::kDirections * map.plane_stride + 64), 0);
+
+  const int reach = std::min(
+      15, static_cast<int>(std::floor(kernel.sigma * std::sqrt(2 * kernel.log_ratio))));
+  std::array<std::array<std::uint8_t, kStampRow>, kStampRow> stamp{};
+  for (int y = -reach; y <= reach; ++y)
+    for (int x = -reach; x <= reach; ++x) {
+      const float gain = 1 - static_cast<float>(x * x + y * y) /
+                                 (2 * kernel.sigma * kernel.sigma * kernel.log_ratio);
+      stamp[static_cast<std::size_t>(y + reach)][static_cast<std::size_t>(x + reach)] =
+          static_cast<std::uint8_t>(std::lround(127 * std::max(0.0F, gain)));
+    }
+
+  std::uint8_t* first = map.first();
+  for (const Edgel& edgel : edgels_) {
+    const int x = (edgel.u - region_.x) / coarseness + 1, y = (edgel.v - region_.y) / coarseness + 1;
+    if (x >= map.width || y >= map.height) continue;
+    const int low = edgel.direction / 32;
+    for (const int plane : {low, (low + 1) % GainMap::kDirections}) {
+      std::uint8_t* corner =
+          first + plane * map.plane_stride + (y - reach) * map.row_stride + (x - reach);
+      for (int r = 0; r <= 2 * reach; ++r, corner += map.row_stride) {
+        const std::uint8_t* source = stamp[static_cast<std::size_t>(r)].data();
+        for (int i = 0; i < 16; ++i) corner[i] = std::max(corner[i], source[i]);
+        if (reach > 7)
+          for (int i = 16; i < 32; ++i) corner[i] = std::max(corner[i], source[i]);
+      }
+    }
+  }
+
+  for (int plane = 0; plane < GainMap::kDirections; ++plane) {
+    std::uint8_t* start = first + plane * map.plane_stride;
+    std::uint64_t sum = 0;
+    for (int y = 1; y < map.height - 1; ++y) {
+      const std::uint8_t* row = start + y * map.row_stride;
+      std::uint32_t row_sum = 0;
+      for (int x = 1; x < map.width - 1; ++x) row_sum += row[x];
+      sum += row_sum;
+    }
+    const auto cells = static_cast<std::uint64_t>((map.width - 2) * (map.height - 2));
+    const int mean = std::min<int>(GainMap::kZero, static_cast<int>((sum + cells / 2) / cells));
+    const auto shift = static_cast<std::uint8_t>(GainMap::kZero - mean);
+    for (int y = 0; y < map.height; ++y) {
+      std::uint8_t* row = start + y * map.row_stride;
+      for (int x = 0; x < map.width; ++x) row[x] = static_cast<std::uint8_t>(row[x] + shift);
+    }
+    // Outside the image nothing is known; outside the region no edge was looked for.
+    const auto outside = [&](bool at_image_border) {
+      return at_image_border ? static_cast<std::uint8_t>(GainMap::kZero) : shift;
+    };
+    std::uint8_t* last = start + (map.height - 1) * map.row_stride;
+    std::fill(start, start + map.width, outside(region_.y == 0));
+    std::fill(last, last + map.width, outside(region_.br().y >= image_size_.height));
+    for (int y = 0; y < map.height; ++y) {
+      start[y * map.row_stride] = outside(region_.x == 0);
+      start[y * map.row_stride + map.width - 1] = outside(region_.br().x >= image_size_.width);
+    }
+  }
+}
+
+}  // namespace leap_object_tracker

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "leap_object_tracker/geometry/mesh.hpp"
+#include "leap_object_tracker/tracking/contour_model.hpp"
+
+namespace leap_object_tracker {
+
+/// Contours of a mesh from a sphere of directions, at several distances.
+struct MeshViews {
+  std::vector<Eigen::Vector3f> directions;  ///< unit vectors from the object's origin to the eye
+  std::vector<float> shell_limits;          ///< [m] limits between the distances, ascending
+  float nearest = 0;                        ///< [m] closer than this no view is known
+  std::vector<ContourView> views;           ///< shell by shell, all directions of a shell together
+};
+
+/// Finds outlines, self-occlusions and creases sharper than 30 deg that are visible from each place,
+/// with a depth buffer. Uses all cores.
+/// @param cache_folder where the result is kept, named by its content; empty: nowhere. A folder that
+/// cannot be written to, or a damaged file in it, is ignored.
+MeshViews makeMeshViews(const Mesh& mesh, int points, const std::string& cache_folder);
+
+}  // namespace leap_object_tracker

@@ -1,0 +1,279 @@
+#include "leap_object_tracker/tracking/pose_refiner.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace leap_object_tracker {
+namespace {
+
+constexpr double kNearest = 0.01;        // [m]
+constexpr double kIndependentLength = 3;  // [px] of contour that one independent edge sample needs
+constexpr double kSupportDistance = 1.5;  // [px]
+constexpr int kLongestRange = 24;        // [px]
+
+/// Grey values of a field at sub-pixel places of the whole image.
+class Sampler {
+ public:
+  explicit Sampler(const EdgeField& field)
+      : image_(field.smooth()),
+        u0_(static_cast<float>(field.region().x)),
+        v0_(static_cast<float>(field.region().y)),
+        last_u_(static_cast<float>(image_.cols - 1)),
+        last_v_(static_cast<float>(image_.rows - 1)) {}
+
+  bool contains(float u, float v) const {
+    return u >= u0_ && v >= v0_ && u < u0_ + last_u_ && v < v0_ + last_v_;
+  }
+
+  /// Bilinear, in 8-bit grey levels; the place must be contained.
+  float operator()(float u, float v) const {
+    const float x = u - u0_, y = v - v0_;
+    const int column = static_cast<int>(x), row = static_cast<int>(y);
+    const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
+    const auto* top = image_.ptr<std::int16_t>(row) + column;
+    const auto* bottom = image_.ptr<std::int16_t>(row + 1) + column;
+    const float upper = static_cast<float>(top[0]) + fx * static_cast<float>(top[1] - top[0]);
+    const float lower =
+        static_cast<float>(bottom[0]) + fx * static_cast<float>(bottom[1] - bottom[0]);
+    return (upper + fy * (lower - upper)) * (1 / 16.0F);
+  }
+
+ private:
+  const cv::Mat& image_;
+  float u0_, v0_, last_u_, last_v_;
+};
+
+double tukeyWeight(double residual, double limit) {
+  const double x = residual / limit;
+  return std::abs(x) >= 1 ? 0 : (1 - x * x) * (1 - x * x);
+}
+
+Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+}  // namespace
+
+Pose movedInCamera(const Pose& camera_from_object, const Twist& camera_twist) {
+  Pose result = camera_from_object;
+  result.translation() += camera_twist.head<3>();
+  result.linear() = rotationFromVector(camera_twist.tail<3>()) * camera_from_object.linear();
+  return result;
+}
+
+Twist cameraTwistBetween(const Pose& from, const Pose& to) {
+  Twist twist;
+  twist.head<3>() = to.translation() - from.translation();
+  twist.tail<3>() = vectorFromRotation(to.linear() * from.linear().transpose());
+  return twist;
+}
+
+/// One contour point that was looked for in one eye.
+struct PoseRefiner::Match {
+  Twist jacobian;       ///< of the offset along the normal, by the camera twist [px]
+  double offset = 0;    ///< [px] from the contour to the edge, along the normal
+  double variance = 1;  ///< [px^2]
+  double samples = 0;   ///< independent ones that the point stands for
+  double length = 0;    ///< [px]
+  int eye = 0;
+  bool found = false;
+  bool outline = false;
+  bool bright_inside = false;
+};
+
+PoseRefiner::PoseRefiner(const ContourParams& params, const RectifiedStereoCamera& camera)
+    : params_(params), camera_(camera) {}
+
+void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2>& fields,
+                        const Pose& pose, double range, double bright_inside,
+                        std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const {
+  matches.clear();
+  const int reach = std::min(kLongestRange, static_cast<int>(std::ceil(range)));
+  const double focal = camera_.focal_length;
+  std::array<float, 2 * kLongestRange + 5> profile{};
+  for (int eye = 0; eye < 2; ++eye) {
+    const EdgeField& field = fields[static_cast<std::size_t>(eye)];
+    eyes[static_cast<std::size_t>(eye)] = {};
+    if (!field.seen()) continue;
+    const Sampler sample(field);
+    const Eigen::Vector3d eye_place(eye == 0 ? 0 : camera_.baseline, 0, 0);
+    const Eigen::Vector3d origin = pose.translation() - eye_place;
+    const ViewChoice choice =
+        model.choose((-(pose.linear().transpose() * origin)).cast<float>());
+    if (choice.view == nullptr) continue;
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+    turn(0, 0) = turn(1, 1) = choice.cosine;
+    turn(0, 1) = -choice.sine;
+    turn(1, 0) = choice.sine;
+    const Eigen::Matrix3d rotation = pose.linear() * turn;
+    const float weakest = std::max(1.0F, 0.5F * field.gradientNoise());
+
+    for (const ContourPoint& point : choice.view->points) {
+      const Eigen::Vector3d arm = rotation * point.position.cast<double>();
+      const Eigen::Vector3d at = origin + arm;
+      if (at.z() < kNearest) continue;
+      const double scale = focal / at.z(), x = at.x() / at.z(), y = at.y() / at.z();
+      const double u = camera_.center_u + focal * x, v = camera_.center_v + focal * y;
+      const Eigen::Vector3d along = rotation * point.tangent.cast<double>();
+      const Eigen::Vector2d tangent(scale * (along.x() - x * along.z()),
+                                    scale * (along.y() - y * along.z()));
+      const double stretch = tangent.norm();
+      if (stretch * point.length < 0.02) continue;  // seen end on
+      Eigen::Vector2d normal(-tangent.y() / stretch, tangent.x() / stretch);
+      Match match;
+      match.eye = eye;
+      match.length = stretch * point.length;
+      match.outline = point.outline();
+      if (match.outline) {
+        const Eigen::Vector3d out = rotation * point.outward.cast<double>();
+        if (normal.dot(Eigen::Vector2d(out.x() - x * out.z(), out.y() - y * out.z())) < 0)
+          normal = -normal;
+      }
+      // Off the image nothing is known.
+      if (u < 1 || v < 1 || u > camera_.size.width - 3 || v > camera_.size.height - 3) continue;
+
+      Eigen::Matrix<double, 2, 3> projection;
+      projection << scale, 0, -scale * x, 0, scale, -scale * y;
+      const Eigen::RowVector3d row = normal.transpose() * projection;
+      match.jacobian.head<3>() = row.transpose();
+      match.jacobian.tail<3>() = -(row * skew(arm)).transpose();
+      match.samples = std::min(1.0, match.length / kIndependentLength);
+
+      const auto fu = static_cast<float>(u), fv = static_cast<float>(v);
+      const auto nu = static_cast<float>(normal.x()), nv = static_cast<float>(normal.y());
+      // Grey values along the normal; the part inside the region only.
+      int low = -reach - 2, high = reach + 2;
+      const auto inside = [&](int k) {
+        return sample.contains(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
+      };
+      while (low <= 0 && !inside(low)) ++low;
+      while (high >= 0 && !inside(high)) --high;
+      if (low <= -2 && high >= 2) {
+        for (int k = low; k <= high; ++k)
+          profile[static_cast<std::size_t>(k + reach + 2)] =
+              sample(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
+        const auto slope = [&](int k) {
+          return 0.5F * (profile[static_cast<std::size_t>(k + reach + 3)] -
+                         profile[static_cast<std::size_t>(k + reach + 1)]);
+        };
+        float best = 0;
+        const float blur = static_cast<float>(std::max(1.0, 0.5 * range));
+        for (int k = low + 2; k <= high - 2; ++k) {
+          const float here = slope(k), size = std::abs(here);
+          if (size < weakest) continue;
+          const float before = slope(k - 1), after = slope(k + 1);
+          const float sign = here > 0 ? 1.0F : -1.0F;
+          if (sign * before >= size || sign * after > size) continue;
+          const float bend = sign * before - 2 * size + sign * after;
+          const float place =
+              static_cast<float>(k) + (bend < 0 ? 0.5F * sign * (before - after) / bend : 0.0F);
+          if (std::abs(place) > range) continue;
+          float value = std::sqrt(size) * std::exp(-0.5F * place * place / (blur * blur));
+          // Towards the outside an outline darkens where the object is brighter than what is behind.
+          const bool brighter_inside = here < 0;
+          if (match.outline)
+            value *= static_cast<float>(brighter_inside ? bright_inside : 1 - bright_inside);
+          if (value <= best) continue;
+          best = value;
+          match.found = true;
+          match.offset = place;
+          match.bright_inside = brighter_inside;
+          match.variance = params_.edge_sigma * params_.edge_sigma +
+                           std::pow(weakest / size, 2);
+        }
+        if (match.found) {
+          // The edge must run along the contour: its slope lies across.
+          const float eu = fu + static_cast<float>(match.offset) * nu;
+          const float ev = fv + static_cast<float>(match.offset) * nv;
+          if (sample.contains(eu - nv - nu, ev + nu - nv) &&
+              sample.contains(eu + nv + nu, ev - nu + nv) &&
+              sample.contains(eu - nv + nu, ev + nu + nv) &&
+              sample.contains(eu + nv - nu, ev - nu - nv)) {
+            const float across = sample(eu + nu, ev + nv) - sample(eu - nu, ev - nv);
+            const float along_edge = sample(eu - nv, ev + nu) - sample(eu + nv, ev - nu);
+            if (std::abs(along_edge) > 0.8F * std::abs(across)) match.found = false;
+          }
+        }
+      }
+      auto& support = eyes[static_cast<std::size_t>(eye)];
+      support.visible += match.length;
+      if (match.found && std::abs(match.offset) < kSupportDistance)
+        support.supported += match.length;
+      matches.push_back(match);
+    }
+  }
+}
+
+RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
+                                const Pose& start, const PosePrior& prior, double bright_inside,
+                                const std::vector<double>& ranges) const {
+  RefinedPose result;
+  result.camera_from_object = start;
+  thread_local std::vector<Match> matches;
+  Pose& pose = result.camera_from_object;
+
+  const auto robustScale = [&](double range) {
+    thread_local std::vector<double> sizes;
+    sizes.clear();
+    for (const Match& m : matches)
+      if (m.found) sizes.push_back(std::abs(m.offset));
+    if (sizes.size() < 6) return range;
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    return std::max(0.25, 1.4826 * *middle);
+  };
+
+  for (const double range : ranges) {
+    match(model, fields, pose, range, bright_inside, matches, result.eyes);
+    const double deviation = robustScale(range);
+    const double limit = std::min(range + 1, 4.685 * std::max(deviation, params_.edge_sigma));
+    // Edges that lie farther off than their noise says share a wrong pose, not wrong edges.
+    const double inflation = std::max(1.0, deviation / params_.edge_sigma);
+    Matrix6d information = prior.information;
+    const Twist from_mean = cameraTwistBetween(prior.mean, pose);
+    Twist gradient = -prior.information * from_mean;
+    Matrix6d damping = Matrix6d::Zero();
+    damping.diagonal() << 1, 1, 1, 1e-3, 1e-3, 1e-3;
+    for (const Match& m : matches) {
+      if (!m.found) continue;
+      const double weight =
+          tukeyWeight(m.offset, limit) * m.samples / (m.variance * inflation * inflation);
+      information.noalias() += weight * m.jacobian * m.jacobian.transpose();
+      gradient += weight * m.offset * m.jacobian;
+    }
+    // Directions that neither edges nor prior bind stay where they are.
+    const Twist step = (information + damping).ldlt().solve(gradient);
+    if (!step.allFinite()) break;
+    Twist limited = step;
+    const double turn = limited.tail<3>().norm();
+    if (turn > 0.35) limited *= 0.35 / turn;
+    pose = normalized(movedInCamera(pose, limited));
+  }
+
+  const double last_range = 2.5;
+  match(model, fields, pose, last_range, bright_inside, matches, result.eyes);
+  const double deviation = robustScale(last_range);
+  result.residual = deviation;
+  double bright = 0, judged = 0;
+  for (const Match& m : matches) {
+    double gain = 0;
+    if (m.found) {
+      const double weight = tukeyWeight(m.offset, 4.685 * std::max(deviation, params_.edge_sigma));
+      result.information.noalias() +=
+          weight * m.samples / m.variance * m.jacobian * m.jacobian.transpose();
+      if (m.outline && std::abs(m.offset) < kSupportDistance) {
+        judged += m.length;
+        if (m.bright_inside) bright += m.length;
+      }
+      gain = 1 - 0.5 * std::pow(m.offset / 0.8, 2);
+    }
+    // Against chance: an edge within reach of an arbitrary place is seen about every third time.
+    result.log_likelihood += m.samples * std::max(gain, -1.0) + (m.found ? 0 : -m.samples);
+  }
+  result.bright_inside = judged > 0 ? bright / judged : 0.5;
+  return result;
+}
+
+}  // namespace leap_object_tracker

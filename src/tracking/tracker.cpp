@@ -1,0 +1,312 @@
+#include "leap_object_tracker/tracking/tracker.hpp"
+
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "leap_object_tracker/tracking/contour_measurement.hpp"
+#include "leap_object_tracker/tracking/particle_filter.hpp"
+#include "leap_object_tracker/tracking/pose_belief.hpp"
+#include "leap_object_tracker/tracking/pose_refiner.hpp"
+
+namespace leap_object_tracker {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double millisecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+constexpr double kLongestStep = 0.25;   // [s] longer gaps count as this long
+constexpr int kHypotheses = 4;          // refined a frame
+constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
+constexpr int kPatience = 3;            // frames below it before the object counts as lost
+
+void check(bool right, const char* message) {
+  if (!right) throw std::invalid_argument(message);
+}
+
+}  // namespace
+
+class Tracker::Impl {
+ public:
+  Impl(const TrackerParams& params, const ObjectModel& object, const RectifiedStereoCamera& camera)
+      : params_(params),
+        object_(object),
+        camera_(camera),
+        model_(object, params.contour.points, params.contour.cache_folder),
+        measurement_(params.contour, params.eyes, camera),
+        refiner_(params.contour, camera),
+        filter_(params.filter),
+        arena_(std::max(1, params.threads)) {
+    check(camera.focal_length > 0 && camera.baseline > 0 && camera.size.area() > 0,
+          "tracker: the camera needs a focal length, a baseline and a size");
+    check(params.measurement == "contour",
+          "tracker: measurement must be 'contour' (others are not available yet)");
+    check(!object.mesh.vertices.empty(), "tracker: the object has no mesh");
+    Eigen::Vector3d low = object.mesh.vertices.front(), high = low;
+    for (const auto& vertex : object.mesh.vertices) {
+      low = low.cwiseMin(vertex);
+      high = high.cwiseMax(vertex);
+    }
+    for (int corner = 0; corner < 8; ++corner)
+      corners_[static_cast<std::size_t>(corner)] =
+          Eigen::Vector3d((corner & 1) != 0 ? high.x() : low.x(),
+                          (corner & 2) != 0 ? high.y() : low.y(),
+                          (corner & 4) != 0 ? high.z() : low.z());
+  }
+
+  void start(const Pose& camera_from_object) {
+    belief_ = beliefAt(camera_from_object, params_.start.position_sigma,
+                       params_.start.rotation_sigma_deg * M_PI / 180);
+    filter_.initialize(belief_.pose, belief_.poseCovariance(), belief_.velocity,
+                       belief_.velocityCovariance());
+    report_.state = TrackerState::kTracking;
+    weak_frames_ = 0;
+    fresh_ = true;
+    last_stamp_.reset();
+  }
+
+  void search() {
+    report_.state = TrackerState::kSearching;
+    last_stamp_.reset();
+  }
+
+  void stop() {
+    report_ = {};
+    last_stamp_.reset();
+  }
+
+  std::optional<PoseEstimate> track(const RectifiedStereoFrame& frame,
+                                    const std::optional<Pose>& fixed_from_camera) {
+    std::optional<PoseEstimate> estimate;
+    arena_.execute([&] { estimate = trackInArena(frame, fixed_from_camera); });
+    return estimate;
+  }
+
+  const TrackerParams params_;
+  const ObjectModel object_;
+  const RectifiedStereoCamera camera_;
+  const ContourModel model_;
+  TrackerReport report_;
+  ParticleFilter filter_;
+
+ private:
+  std::optional<PoseEstimate> trackInArena(const RectifiedStereoFrame& frame,
+                                           const std::optional<Pose>& fixed_from_camera) {
+    report_.edges_ms = report_.filter_ms = report_.search_ms = 0;
+    if (report_.state == TrackerState::kIdle || report_.state == TrackerState::kSearching)
+      return std::nullopt;
+
+    const Pose camera_motion = cameraMotion(fixed_from_camera);
+    predict(frame.stamp, camera_motion);
+
+    auto started = Clock::now();
+    measurement_.observe(frame, regions(belief_));
+    report_.edges_ms = millisecondsSince(started);
+
+    started = Clock::now();
+    scoreParticles();
+    const RefinedPose refined = refineBest();
+    takeOver(refined);
+    report_.filter_ms = millisecondsSince(started);
+
+    if (report_.state != TrackerState::kTracking) return std::nullopt;
+    PoseEstimate estimate;
+    estimate.stamp = frame.stamp;
+    estimate.camera_from_object = belief_.pose;
+    estimate.covariance = belief_.poseCovariance();
+    estimate.support = report_.support;
+    return estimate;
+  }
+
+  Pose cameraMotion(const std::optional<Pose>& fixed_from_camera) {
+    Pose motion = Pose::Identity();
+    if (fixed_from_camera && last_fixed_from_camera_)
+      motion = fixed_from_camera->inverse() * *last_fixed_from_camera_;
+    last_fixed_from_camera_ = fixed_from_camera;
+    return motion;
+  }
+
+  void predict(Stamp stamp, const Pose& camera_motion) {
+    double dt = 0;
+    if (last_stamp_) dt = std::clamp(seconds(stamp - *last_stamp_), 0.0, kLongestStep);
+    last_stamp_ = stamp;
+    belief_.predict(params_.motion, dt, camera_motion);
+    filter_.predict(params_.motion, dt, camera_motion);
+  }
+
+  /// Where the object can be in each eye: the projected bounding box and three deviations around it.
+  std::array<cv::Rect, 2> regions(const PoseBelief& belief) const {
+    std::array<cv::Rect, 2> regions;
+    const cv::Rect whole(cv::Point(), camera_.size);
+    const double depth = std::max(0.02, belief.pose.translation().z() - model_.radius());
+    const Twist deviation = belief.poseCovariance().diagonal().cwiseMax(0).cwiseSqrt();
+    const double spread = deviation.head<2>().maxCoeff() +
+                          deviation.z() * 0.5 +
+                          model_.radius() * std::min(0.3, deviation.tail<3>().maxCoeff());
+    const double margin =
+        std::min(80.0, 10 + 2.5 * camera_.focal_length * spread / std::max(0.04, depth));
+    for (std::size_t eye = 0; eye < 2; ++eye) {
+      double low_u = 1e9, low_v = 1e9, high_u = -1e9, high_v = -1e9;
+      for (const auto& corner : corners_) {
+        Eigen::Vector3d point = belief.pose * corner;
+        if (eye == 1) point.x() -= camera_.baseline;
+        point.z() = std::max(point.z(), 0.015);
+        const Eigen::Vector2d pixel = camera_.leftPixel(point);
+        low_u = std::min(low_u, pixel.x());
+        high_u = std::max(high_u, pixel.x());
+        low_v = std::min(low_v, pixel.y());
+        high_v = std::max(high_v, pixel.y());
+      }
+      const auto rounded = [&](double value, double extra) {
+        return static_cast<int>(std::clamp(value + extra, -10000.0, 10000.0));
+      };
+      const cv::Point first(rounded(low_u, -margin) & ~7, rounded(low_v, -margin) & ~7);
+      const cv::Point last((rounded(high_u, margin) | 7) + 1, (rounded(high_v, margin) | 7) + 1);
+      regions[eye] = cv::Rect(first, last) & whole;
+    }
+    return regions;
+  }
+
+  void scoreParticles() {
+    using Sharpness = ContourMeasurement::Sharpness;
+    const auto scorer = [&](Sharpness sharpness) {
+      return [this, sharpness](const ParticlePose* poses, std::size_t count, float* out) {
+        measurement_.score(model_, sharpness, poses, count, out);
+      };
+    };
+    for (int layer = 0; layer + 1 < params_.filter.layers; ++layer)
+      filter_.anneal(scorer(Sharpness::kBlunt), 0.2, 0.4, layer);
+    filter_.weigh(scorer(Sharpness::kSharp));
+    report_.effective_share = filter_.effectiveShare();
+    report_.particles = static_cast<int>(filter_.particles().size());
+  }
+
+  /// Refines the prediction and the best particles that differ from each other; the one that
+  /// explains image and prediction best wins.
+  RefinedPose refineBest() {
+    const Matrix6d prior_information = belief_.poseCovariance().inverse();
+    const PosePrior prior{belief_.pose, prior_information};
+    std::vector<Pose> starts{belief_.pose};
+    const auto& scores = filter_.logLikelihoods();
+    std::vector<std::uint32_t> order(scores.size());
+    std::iota(order.begin(), order.end(), 0U);
+    const std::size_t candidates = std::min<std::size_t>(order.size(), 64);
+    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(candidates),
+                      order.end(), [&](std::uint32_t a, std::uint32_t b) {
+                        return scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
+                      });
+    for (std::size_t i = 0; i < candidates && starts.size() < kHypotheses; ++i) {
+      const Pose pose = toPose(filter_.particles()[order[i]].pose);
+      const bool near = std::any_of(starts.begin() + 1, starts.end(), [&](const Pose& other) {
+        return (pose.translation() - other.translation()).norm() < 0.15 * model_.radius() &&
+               angleBetween(pose.linear(), other.linear()) < 0.15;
+      });
+      if (i == 0 || !near) starts.push_back(pose);
+    }
+
+    RefinedPose best;
+    double best_score = -1e18;
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+      const std::vector<double> ranges =
+          i == 0 && !fresh_ ? std::vector<double>{6, 4, 2.5} : std::vector<double>{8, 5, 3, 2.5};
+      const RefinedPose refined = refiner_.refine(model_, measurement_.fields(), starts[i], prior,
+                                                  bright_inside_, ranges);
+      const Twist shift = cameraTwistBetween(belief_.pose, refined.camera_from_object);
+      const double score =
+          refined.log_likelihood - 0.5 * shift.dot(prior_information * shift);
+      if (score > best_score) {
+        best_score = score;
+        best = refined;
+      }
+    }
+    return best;
+  }
+
+  void takeOver(const RefinedPose& refined) {
+    report_.support = refined.support();
+    const bool supported = report_.support >= kLeastSupport;
+    if (supported) {
+      belief_.update(refined.camera_from_object, refined.information);
+      bright_inside_ = std::clamp(0.9 * bright_inside_ + 0.1 * refined.bright_inside, 0.2, 0.95);
+      weak_frames_ = 0;
+      report_.state = TrackerState::kTracking;
+    } else if (++weak_frames_ >= kPatience) {
+      report_.state = TrackerState::kLost;
+    }
+    fresh_ = false;
+    filter_.resample(params_.filter.resample_below);
+    if (supported)
+      filter_.inject(0.5, belief_.pose, belief_.poseCovariance(), belief_.velocity,
+                     belief_.velocityCovariance());
+  }
+
+  ContourMeasurement measurement_;
+  PoseRefiner refiner_;
+  tbb::task_arena arena_;
+  std::array<Eigen::Vector3d, 8> corners_;
+  PoseBelief belief_;
+  std::optional<Stamp> last_stamp_;
+  std::optional<Pose> last_fixed_from_camera_;
+  double bright_inside_ = 0.7;
+  int weak_frames_ = 0;
+  bool fresh_ = false;
+};
+
+Tracker::Tracker(const TrackerParams& params, const ObjectModel& object,
+                 const RectifiedStereoCamera& camera)
+    : impl_(std::make_unique<Impl>(params, object, camera)) {}
+Tracker::~Tracker() = default;
+Tracker::Tracker(Tracker&&) noexcept = default;
+Tracker& Tracker::operator=(Tracker&&) noexcept = default;
+
+void Tracker::start(const Pose& camera_from_object) { impl_->start(camera_from_object); }
+void Tracker::search() { impl_->search(); }
+void Tracker::stop() { impl_->stop(); }
+
+std::optional<PoseEstimate> Tracker::track(const RectifiedStereoFrame& frame,
+                                           const std::optional<Pose>& fixed_from_camera) {
+  return impl_->track(frame, fixed_from_camera);
+}
+
+const TrackerReport& Tracker::report() const { return impl_->report_; }
+
+std::vector<Pose> Tracker::particles() const {
+  std::vector<Pose> poses;
+  if (impl_->report_.state == TrackerState::kIdle) return poses;
+  poses.reserve(impl_->filter_.particles().size());
+  for (const auto& particle : impl_->filter_.particles()) poses.push_back(toPose(particle.pose));
+  return poses;
+}
+
+const ObjectModel& Tracker::object() const { return impl_->object_; }
+const RectifiedStereoCamera& Tracker::camera() const { return impl_->camera_; }
+const TrackerParams& Tracker::params() const { return impl_->params_; }
+
+std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> Tracker::contour(
+    const Pose& camera_from_object, int eye) const {
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> pieces;
+  Pose pose = camera_from_object;
+  if (eye == 1) pose.translation().x() -= impl_->camera_.baseline;
+  const Eigen::Vector3d place = -(pose.linear().transpose() * pose.translation());
+  const ViewChoice choice = impl_->model_.choose(place.cast<float>());
+  if (choice.view == nullptr) return pieces;
+  pose.linear() = pose.linear() * Eigen::AngleAxisd(std::atan2(choice.sine, choice.cosine),
+                                                    Eigen::Vector3d::UnitZ());
+  for (const ContourPoint& point : choice.view->points) {
+    const Eigen::Vector3d half = 0.5 * (point.length * point.tangent).cast<double>();
+    const Eigen::Vector3d a = pose * (point.position.cast<double>() - half);
+    const Eigen::Vector3d b = pose * (point.position.cast<double>() + half);
+    if (a.z() > 0.005 && b.z() > 0.005)
+      pieces.emplace_back(impl_->camera_.leftPixel(a), impl_->camera_.leftPixel(b));
+  }
+  return pieces;
+}
+
+}  // namespace leap_object_tracker
