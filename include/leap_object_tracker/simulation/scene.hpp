@@ -53,7 +53,7 @@ struct SensorParams {
   double read_noise = 1.2;      ///< [counts] at gain 1, one row
   double fixed_noise = 0.3;     ///< [counts] the same in every frame
   double dark_offset = 2.5;     ///< [counts]
-  double lens_blur = 0.35;      ///< [px of the 480-row grid] standard deviation
+  double lens_blur = 0.5;       ///< [px of the 480-row grid] standard deviation
   double vignetting = 1.5;      ///< falls off with cos^n of the angle from the axis
   double glow = 0.05;           ///< [counts/us] stray light of the LEDs at the side borders
   double pulse_limit_us = 511;  ///< longest exposure of the automatic control
