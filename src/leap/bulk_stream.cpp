@@ -12,9 +12,17 @@ constexpr int kFewestTransfers = 4;
 constexpr int kMostFailuresInRow = 50;
 constexpr std::chrono::milliseconds kPauseAfterError{5};
 constexpr std::chrono::seconds kDrainTimeout{2};
+constexpr int kPriority = 10;  // of real-time threads
 
 timeval toTimeval(std::chrono::microseconds duration) {
   return {duration.count() / 1000000, duration.count() % 1000000};
+}
+
+/// Lets a thread go first, where the user may do that: pictures are lost if it comes late.
+void hurry(std::thread& thread) {
+  sched_param priority{};
+  priority.sched_priority = kPriority;
+  pthread_setschedparam(thread.native_handle(), SCHED_FIFO, &priority);
 }
 
 void handleEvents(libusb_context* context, std::chrono::microseconds timeout) {
@@ -58,6 +66,7 @@ BulkStream::BulkStream(UsbLink& link, std::uint8_t endpoint, int transfers,
   }
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "leap_usb");
+  hurry(thread_);
 }
 
 BulkStream::~BulkStream() {

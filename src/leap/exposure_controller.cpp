@@ -14,7 +14,8 @@ constexpr double kFaintest = 6;        // below it a level says little
 constexpr double kLargestRise = 4;     // in one step, from so faint a picture
 constexpr double kHighestLevel = 220;  // of the brightest share that may not saturate
 constexpr double kHoldBelow = 1.25, kHoldAbove = 1.05;
-constexpr int kMostSamples = 20000;
+constexpr int kMostSamples = 40000;
+constexpr double kGlowMargin = 0.1;  // share of the width at each side that the LEDs shine into
 
 struct Histogram {
   std::array<int, 256> count = {};
@@ -37,7 +38,10 @@ struct Histogram {
 
 Histogram histogram(const cv::Mat& image, const cv::Rect& region) {
   const cv::Rect whole(0, 0, image.cols, image.rows);
-  const cv::Rect part = region.area() > 0 ? (region & whole) : whole;
+  const int margin = static_cast<int>(kGlowMargin * image.cols);
+  const cv::Rect part = region.area() > 0
+                            ? (region & whole)
+                            : cv::Rect(margin, 0, image.cols - 2 * margin, image.rows);
   const int step =
       std::max(1, static_cast<int>(std::sqrt(static_cast<double>(part.area()) / kMostSamples)));
   Histogram histogram;
@@ -50,9 +54,10 @@ Histogram histogram(const cv::Mat& image, const cv::Rect& region) {
 }
 
 /// How far to go down when part of the picture is at the end of the scale and cannot tell.
-double retreat(double saturated) {
-  if (saturated > 0.2) return 0.1;
-  if (saturated > 0.05) return 0.3;
+/// @param excess share of saturated pixels over the allowed one
+double retreat(double excess) {
+  if (excess > 30) return 0.1;
+  if (excess > 6) return 0.3;
   return 0.7;
 }
 
@@ -67,7 +72,7 @@ ExposureController::ExposureController(const ExposureParams& params) : params_(p
   const auto share = [](double value) { return value > 0 && value < 1; };
   if (!(params.bright_level >= 20 && params.bright_level <= 240) || !share(params.bright_share) ||
       !share(params.bright_share_image) || !share(params.most_saturated) ||
-      params.longest_exposure_us < kShortestExposureUs ||
+      !share(params.most_saturated_image) || params.longest_exposure_us < kShortestExposureUs ||
       params.longest_exposure_us > kLongestExposureUs || params.most_gain < kLeastAnalogGain ||
       params.most_gain > kMostAnalogGain)
     throw std::invalid_argument(
@@ -81,13 +86,16 @@ std::optional<LeapControls> ExposureController::update(const cv::Mat& image, con
   const Histogram seen = histogram(image, region);
   if (seen.total == 0) return std::nullopt;
   const double saturated = seen.shareFrom(kSaturated);
-  const double share = region.area() > 0 ? params_.bright_share : params_.bright_share_image;
+  const bool knows_region = region.area() > 0;
+  const double share = knows_region ? params_.bright_share : params_.bright_share_image;
+  const double most_saturated =
+      knows_region ? params_.most_saturated : params_.most_saturated_image;
   const double bright = linearLevel(seen.level(share), taken_with.gamma);
-  const double brightest = linearLevel(seen.level(1 - params_.most_saturated), taken_with.gamma);
+  const double brightest = linearLevel(seen.level(1 - most_saturated), taken_with.gamma);
 
   double wanted;
-  if (saturated > params_.most_saturated)
-    wanted = taken_with.light() * retreat(saturated);
+  if (saturated > most_saturated)
+    wanted = taken_with.light() * retreat(saturated / most_saturated);
   else if (std::max(bright, brightest) < kFaintest)
     wanted = taken_with.light() * kLargestRise;
   else
@@ -96,7 +104,7 @@ std::optional<LeapControls> ExposureController::update(const cv::Mat& image, con
 
   const double now = commanded.light();
   const bool good_enough =
-      saturated <= params_.most_saturated && now > wanted / kHoldBelow && now < wanted * kHoldAbove;
+      saturated <= most_saturated && now > wanted / kHoldBelow && now < wanted * kHoldAbove;
   if (good_enough) return std::nullopt;
   const LeapControls next = withLight(commanded, wanted);
   if (next == commanded) return std::nullopt;

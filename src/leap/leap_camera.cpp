@@ -9,8 +9,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kLookAgain{200};       // for one that is absent
-constexpr milliseconds kTryAgain{1000};       // one that refused
+constexpr milliseconds kLookAgain{200};  // for one that is absent
+constexpr milliseconds kTryAgain{1000};  // one that refused
 constexpr milliseconds kTryLockedAgain{5000};
 constexpr std::chrono::seconds kUnrest{30};
 constexpr std::size_t kManyDisconnections = 3;
@@ -93,8 +93,9 @@ void LeapCamera::disconnect(const LeapError& error) {
   while (!disconnections_.empty() && Clock::now() - disconnections_.front() > kUnrest)
     disconnections_.pop_front();
   if (disconnections_.size() >= kManyDisconnections)
-    message += "; it left the bus several times within half a minute, which looks like too little "
-               "power: use another port, a shorter cable or a powered hub";
+    message +=
+        "; it left the bus several times within half a minute, which looks like too little "
+        "power: use another port, a shorter cable or a powered hub";
 
   const std::lock_guard<std::mutex> lock(mutex_);
   status_.state = LeapState::kWaiting;

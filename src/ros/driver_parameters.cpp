@@ -26,7 +26,8 @@ DriverNodeParams readDriverNodeParams(ParameterReader& reader) {
     section.read("bright_level", exposure.bright_level, {20, 240});
     section.read("bright_share", exposure.bright_share, {0.01, 0.99});
     section.read("bright_share_image", exposure.bright_share_image, {0.01, 0.9999});
-    section.read("most_saturated", exposure.most_saturated, {0.0001, 0.5});
+    section.read("most_saturated", exposure.most_saturated, {0.00001, 0.5});
+    section.read("most_saturated_image", exposure.most_saturated_image, {0.00001, 0.5});
     section.read("longest_exposure_us", exposure.longest_exposure_us,
                  {kShortestExposureUs, kLongestExposureUs});
     section.read("most_gain", exposure.most_gain, {kLeastAnalogGain, kMostAnalogGain});

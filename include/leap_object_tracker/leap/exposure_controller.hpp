@@ -8,12 +8,13 @@
 namespace leap_object_tracker {
 
 struct ExposureParams {
-  double bright_level = 150;         ///< wanted level of the bright parts, 0 to 255, linear
-  double bright_share = 0.90;        ///< share of a region's pixels that are darker than these
-  double bright_share_image = 0.98;  ///< the same where no region is known
-  double most_saturated = 0.005;     ///< share of pixels that may be at the upper end
-  int longest_exposure_us = 500;     ///< [us] longer ones blur
-  int most_gain = 48;                ///< [1/16]
+  double bright_level = 150;              ///< wanted level of the bright parts, 0 to 255, linear
+  double bright_share = 0.90;             ///< share of a region's pixels that are darker than these
+  double most_saturated = 0.005;          ///< share of its pixels that may be at the upper end
+  double bright_share_image = 0.997;      ///< the same two where no region is known, of the whole
+  double most_saturated_image = 0.00015;  ///< image without the glow of the LEDs at its sides
+  int longest_exposure_us = 500;          ///< [us] longer ones blur
+  int most_gain = 48;                     ///< [1/16]
 };
 
 /// Keeps a part of the picture well exposed, over exposure time first and analog gain after.

@@ -21,10 +21,10 @@ enum class LeapState { kWaiting, kStreaming };
 /// How the camera fares.
 struct LeapStatus {
   LeapState state = LeapState::kWaiting;
-  std::string message;      ///< why it waits, and what to do; changes only with the reason
-  LeapIdentity identity;    ///< of the present or last device
-  LeapCounters counters;    ///< of all connections together
-  int connections = 0;      ///< since construction
+  std::string message;    ///< why it waits, and what to do; changes only with the reason
+  LeapIdentity identity;  ///< of the present or last device
+  LeapCounters counters;  ///< of all connections together
+  int connections = 0;    ///< since construction
 };
 
 /// A Leap that may come and go: waits for it, sets it up, and does so again after it was unplugged
