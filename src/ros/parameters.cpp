@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 namespace leap_object_tracker {
@@ -18,6 +19,15 @@ std::string printed(double value) {
 
 std::string printed(const Range& range) {
   return printed(range.low) + " to " + printed(range.high);
+}
+
+/// Where the user's programs keep what they can compute again; empty if there is no such place.
+std::string usersCacheFolder() {
+  const char* const cache = std::getenv("XDG_CACHE_HOME");
+  const char* const home = std::getenv("HOME");
+  if (cache != nullptr && *cache == '/') return std::string(cache) + "/leap_object_tracker";
+  if (home != nullptr && *home == '/') return std::string(home) + "/.cache/leap_object_tracker";
+  return "";
 }
 
 YAML::Node treeFrom(XmlRpc::XmlRpcValue& value) {
@@ -148,6 +158,9 @@ TrackerNodeParams readTrackerNodeParams(ParameterReader& reader) {
     r.read("truncation", p.truncation, {1, 100});
     r.read("outlier_share", p.outlier_share, {0.001, 0.99});
     r.read("edge_sigma", p.edge_sigma, {0.01, 10});
+    std::string cache = "auto";
+    r.read("cache_folder", cache);
+    p.cache_folder = cache == "auto" ? usersCacheFolder() : cache;
   });
   reader.section("volume", [&](ParameterReader& r) {
     VolumeParams& p = tracker.volume;

@@ -41,20 +41,20 @@ std::vector<Expected> readExpected() {
   return all;
 }
 
-struct Run {
+struct Tracked {
   Trajectory truth, poses;
   std::vector<Stamp> frames;
   ObjectModel object;
 };
 
-Run track(const Expected& expected, int threads) {
+Tracked track(const Expected& expected, int threads) {
   const std::string root = LEAP_SOURCE_FOLDER "/";
   const std::string config = root + "config/" + expected.config;
   ParameterReader reader(loadYamlFile(config), config);
   TrackerParams params = readTrackerNodeParams(reader).tracker;
   params.threads = threads;
   const StereoBag bag(root + "bags/" + expected.bag, {}, params.eyes);
-  Run run;
+  Tracked run;
   run.truth = bag.truth();
   run.object = loadObject(root + "config/objects/" + expected.object);
   const StereoRectifier rectifier(bag.calibration(), rectifiedCamera(bag.calibration(), {}));
@@ -76,7 +76,7 @@ class Bags : public testing::TestWithParam<Expected> {};
 
 TEST_P(Bags, areTrackedWithinTheirBounds) {
   const Expected& expected = GetParam();
-  const Run run = track(expected, 2);
+  const Tracked run = track(expected, 2);
   EvaluationParams params;
   params.frames = run.frames;
   const TrajectoryReport report = compare(run.poses, run.truth, run.object, params);
@@ -94,7 +94,7 @@ TEST_P(Bags, areTrackedWithinTheirBounds) {
 }
 
 TEST_P(Bags, giveTheSamePosesWhateverTheNumberOfThreads) {
-  const Run one = track(GetParam(), 1), three = track(GetParam(), 3);
+  const Tracked one = track(GetParam(), 1), three = track(GetParam(), 3);
   ASSERT_EQ(one.poses.size(), three.poses.size());
   for (std::size_t i = 0; i < one.poses.size(); ++i)
     EXPECT_EQ(one.poses[i].camera_from_object.matrix(), three.poses[i].camera_from_object.matrix());
