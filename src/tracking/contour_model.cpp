@@ -18,11 +18,21 @@ class ContourModel::Table {
 
 namespace {
 
+/// From a sharp edge to where its outline lies, on average over the views, when the edge is rounded.
+/// With h half the angle between the normals, the outline lies inside of the sharp one by
+/// radius * (cos(a) / cos(h) - 1), a within +-h of the bisector; its mean is radius * (tan(h) / h - 1).
+Eigen::Vector3d roundedEdgeShift(const Eigen::Vector3d& normal_a, const Eigen::Vector3d& normal_b,
+                                 double radius) {
+  const double h = 0.5 * std::acos(std::clamp(normal_a.dot(normal_b), -1.0, 1.0));
+  if (h < 0.05) return Eigen::Vector3d::Zero();
+  return -(normal_a + normal_b).normalized() * (radius * (std::tan(h) - h) / std::sin(h));
+}
+
 /// One view for each set of visible faces of a convex polyhedron.
 class PolyhedronTable : public ContourModel::Table {
  public:
-  PolyhedronTable(const Mesh& mesh, int points) {
-    const std::vector<Edge> edges = findEdges(mesh);
+  PolyhedronTable(const Mesh& mesh, double edge_radius, int points) {
+    const std::vector<Edge> edges = findEdges(mesh, edge_radius);
     const std::size_t sets = std::size_t{1} << faces_.size();
     views_.resize(sets);
     for (std::size_t visible = 1; visible < sets; ++visible)
@@ -53,18 +63,21 @@ class PolyhedronTable : public ContourModel::Table {
     return faces_.size() - 1;
   }
 
-  std::vector<Edge> findEdges(const Mesh& mesh) {
+  std::vector<Edge> findEdges(const Mesh& mesh, double edge_radius) {
     std::vector<Edge> edges;
     for (const auto& adjacency : adjacentTriangles(mesh)) {
       const Eigen::Vector3d& start = mesh.vertices[adjacency.start];
       const Eigen::Vector3d& end = mesh.vertices[adjacency.end];
       std::array<std::size_t, 2> sides{};
+      std::array<Eigen::Vector3d, 2> normals;
       for (std::size_t side = 0; side < 2; ++side) {
-        const Eigen::Vector3d normal =
+        normals[side] =
             triangleNormal(mesh, static_cast<std::size_t>(adjacency.triangles[side]));
-        sides[side] = faceOf(normal, normal.dot(start));
+        sides[side] = faceOf(normals[side], normals[side].dot(start));
       }
-      if (sides[0] != sides[1]) edges.push_back({start, end, sides});
+      if (sides[0] == sides[1]) continue;
+      const Eigen::Vector3d shift = roundedEdgeShift(normals[0], normals[1], edge_radius);
+      edges.push_back({start + shift, end + shift, sides});
     }
     return edges;
   }
@@ -95,13 +108,15 @@ class PolyhedronTable : public ContourModel::Table {
 /// Views of an upright cylinder for an eye in the half plane y = 0, x > 0.
 class CylinderTable : public ContourModel::Table {
  public:
-  CylinderTable(double radius, double height, int points)
+  CylinderTable(double radius, double height, double edge_radius, int points)
       : radius_(static_cast<float>(radius)), half_height_(static_cast<float>(height / 2)) {
     for (const int cap : {-1, 0, 1})
       for (int step = 0; step < kLimbSteps; ++step)
         views_.push_back(makeView(
-            segments(radius, height, cap, (step + 0.5) * (M_PI / 2) / kLimbSteps), points));
-    for (const int cap : {-1, 1}) axial_.push_back(makeView(axial(radius, height, cap), points));
+            segments(radius, height, edge_radius, cap,
+                     (step + 0.5) * (M_PI / 2) / kLimbSteps),
+            points));
+    for (const int cap : {-1, 1}) axial_.push_back(makeView(axial(radius, height, edge_radius, cap), points));
   }
 
   ViewChoice choose(const Eigen::Vector3f& eye) const override {
@@ -125,7 +140,8 @@ class CylinderTable : public ContourModel::Table {
   static constexpr int kRimPieces = 180;
 
   /// @param limb angle [rad] from the eye's direction to where the side turns away
-  static std::vector<ContourSegment> segments(double radius, double height, int cap, double limb) {
+  static std::vector<ContourSegment> segments(double radius, double height, double edge_radius,
+                                              int cap, double limb) {
     std::vector<ContourSegment> all;
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector3d normal(std::cos(limb), side * std::sin(limb), 0);
@@ -133,7 +149,7 @@ class CylinderTable : public ContourModel::Table {
       all.push_back({foot - up, foot + up, normal});
     }
     for (const int end : {-1, 1})
-      addRim(radius, end * height / 2, [&](double angle, const Eigen::Vector3d& radial) {
+      addRim(radius, height, edge_radius, end, [&](double angle, const Eigen::Vector3d& radial) {
         const bool side_seen = std::abs(angle) < limb, cap_seen = cap == end;
         if (side_seen && cap_seen) return std::make_pair(true, Eigen::Vector3d(0, 0, 0));
         if (side_seen) return std::make_pair(true, Eigen::Vector3d(0, 0, end));
@@ -142,16 +158,20 @@ class CylinderTable : public ContourModel::Table {
     return all;
   }
 
-  static std::vector<ContourSegment> axial(double radius, double height, int cap) {
+  static std::vector<ContourSegment> axial(double radius, double height, double edge_radius,
+                                           int cap) {
     std::vector<ContourSegment> all;
-    addRim(radius, cap * height / 2,
+    addRim(radius, height, edge_radius, cap,
            [](double, const Eigen::Vector3d& radial) { return std::make_pair(true, radial); }, all);
     return all;
   }
 
   template <class Judge>
-  static void addRim(double radius, double z, const Judge& judge,
-                     std::vector<ContourSegment>& all) {
+  static void addRim(double full_radius, double height, double edge_radius, int end,
+                     const Judge& judge, std::vector<ContourSegment>& all) {
+    const Eigen::Vector3d shift = roundedEdgeShift(Eigen::Vector3d::UnitX(),
+                                                   end * Eigen::Vector3d::UnitZ(), edge_radius);
+    const double radius = full_radius + shift.x(), z = end * height / 2 + shift.z();
     const auto at = [&](double angle) {
       return Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), z);
     };
@@ -221,13 +241,14 @@ class MeshTable : public ContourModel::Table {
 };
 
 std::unique_ptr<ContourModel::Table> makeTable(const ObjectModel& object, int points,
+                                               double edge_radius,
                                                const std::string& cache_folder) {
   switch (object.shape) {
     case Shape::kBox:
     case Shape::kPrism:
-      return std::make_unique<PolyhedronTable>(object.mesh, points);
+      return std::make_unique<PolyhedronTable>(object.mesh, edge_radius, points);
     case Shape::kCylinder:
-      return std::make_unique<CylinderTable>(object.size.x(), object.size.y(), points);
+      return std::make_unique<CylinderTable>(object.size.x(), object.size.y(), edge_radius, points);
     case Shape::kMesh:
       break;
   }
@@ -236,10 +257,11 @@ std::unique_ptr<ContourModel::Table> makeTable(const ObjectModel& object, int po
 
 }  // namespace
 
-ContourModel::ContourModel(const ObjectModel& object, int points, const std::string& cache_folder)
+ContourModel::ContourModel(const ObjectModel& object, int points, double edge_radius,
+                           const std::string& cache_folder)
     : points_((std::max(points, 1) + 15) / 16 * 16),
       radius_(radiusOf(object.mesh)),
-      table_(makeTable(object, points_, cache_folder)) {}
+      table_(makeTable(object, points_, edge_radius, cache_folder)) {}
 
 ContourModel::~ContourModel() = default;
 ContourModel::ContourModel(ContourModel&&) noexcept = default;

@@ -9,7 +9,9 @@ namespace {
 constexpr double kNearest = 0.01;        // [m]
 constexpr double kIndependentLength = 3;  // [px] of contour that one independent edge sample needs
 constexpr double kSupportDistance = 1.5;  // [px]
-constexpr int kLongestRange = 24;        // [px]
+constexpr int kLongestRange = 24;         // [px]
+constexpr float kClearance = 16;          // [px] lines farther apart do not disturb each other
+constexpr float kAlongside = 4;           // [px]
 
 /// Grey values of a field at sub-pixel places of the whole image.
 class Sampler {
@@ -77,6 +79,7 @@ struct PoseRefiner::Match {
   double variance = 1;  ///< [px^2]
   double samples = 0;   ///< independent ones that the point stands for
   double length = 0;    ///< [px]
+  Eigen::Vector2f place, normal;  ///< [px], unit vector in the image
   int eye = 0;
   bool found = false;
   bool outline = false;
@@ -90,7 +93,6 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
                         const Pose& pose, double range, double bright_inside,
                         std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const {
   matches.clear();
-  const int reach = std::min(kLongestRange, static_cast<int>(std::ceil(range)));
   const double focal = camera_.focal_length;
   std::array<float, 2 * kLongestRange + 5> profile{};
   for (int eye = 0; eye < 2; ++eye) {
@@ -110,12 +112,15 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
     const Eigen::Matrix3d rotation = pose.linear() * turn;
     const float weakest = std::max(1.0F, 0.5F * field.gradientNoise());
 
+    const std::size_t first = matches.size();
     for (const ContourPoint& point : choice.view->points) {
       const Eigen::Vector3d arm = rotation * point.position.cast<double>();
       const Eigen::Vector3d at = origin + arm;
       if (at.z() < kNearest) continue;
       const double scale = focal / at.z(), x = at.x() / at.z(), y = at.y() / at.z();
       const double u = camera_.center_u + focal * x, v = camera_.center_v + focal * y;
+      // Off the image nothing is known.
+      if (u < 1 || v < 1 || u > camera_.size.width - 3 || v > camera_.size.height - 3) continue;
       const Eigen::Vector3d along = rotation * point.tangent.cast<double>();
       const Eigen::Vector2d tangent(scale * (along.x() - x * along.z()),
                                     scale * (along.y() - y * along.z()));
@@ -131,18 +136,34 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         if (normal.dot(Eigen::Vector2d(out.x() - x * out.z(), out.y() - y * out.z())) < 0)
           normal = -normal;
       }
-      // Off the image nothing is known.
-      if (u < 1 || v < 1 || u > camera_.size.width - 3 || v > camera_.size.height - 3) continue;
-
       Eigen::Matrix<double, 2, 3> projection;
       projection << scale, 0, -scale * x, 0, scale, -scale * y;
       const Eigen::RowVector3d row = normal.transpose() * projection;
       match.jacobian.head<3>() = row.transpose();
       match.jacobian.tail<3>() = -(row * skew(arm)).transpose();
       match.samples = std::min(1.0, match.length / kIndependentLength);
+      match.place = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
+      match.normal = normal.cast<float>();
+      matches.push_back(match);
+    }
 
-      const auto fu = static_cast<float>(u), fv = static_cast<float>(v);
-      const auto nu = static_cast<float>(normal.x()), nv = static_cast<float>(normal.y());
+    for (std::size_t i = first; i < matches.size(); ++i) {
+      Match& match = matches[i];
+      const float fu = match.place.x(), fv = match.place.y();
+      const float nu = match.normal.x(), nv = match.normal.y();
+      // Another line of the contour that runs beside this one: an edge between the two belongs to
+      // the nearer.
+      float clearance = kClearance;
+      for (std::size_t j = first; j < matches.size(); ++j) {
+        const float du = matches[j].place.x() - fu, dv = matches[j].place.y() - fv;
+        const float across = std::abs(nu * du + nv * dv);
+        if (across > 0.7F && across < clearance && std::abs(nu * dv - nv * du) < kAlongside &&
+            std::abs(match.normal.dot(matches[j].normal)) > 0.8F)
+          clearance = across;
+      }
+      const double own_range = std::min(range, std::max(0.75, 0.5 * clearance));
+      const int reach = std::min(kLongestRange, static_cast<int>(std::ceil(own_range)));
+
       // Grey values along the normal; the part inside the region only.
       int low = -reach - 2, high = reach + 2;
       const auto inside = [&](int k) {
@@ -159,7 +180,9 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
                          profile[static_cast<std::size_t>(k + reach + 1)]);
         };
         float best = 0;
-        const float blur = static_cast<float>(std::max(1.0, 0.5 * range));
+        // Lines closer than the blur of the image pull each other's edges.
+        const double crowding = std::max(0.0, 0.25 * (4.0 - clearance));
+        const float blur = static_cast<float>(std::max(1.0, 0.5 * own_range));
         for (int k = low + 2; k <= high - 2; ++k) {
           const float here = slope(k), size = std::abs(here);
           if (size < weakest) continue;
@@ -169,7 +192,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           const float bend = sign * before - 2 * size + sign * after;
           const float place =
               static_cast<float>(k) + (bend < 0 ? 0.5F * sign * (before - after) / bend : 0.0F);
-          if (std::abs(place) > range) continue;
+          if (std::abs(place) > own_range) continue;
           float value = std::sqrt(size) * std::exp(-0.5F * place * place / (blur * blur));
           // Towards the outside an outline darkens where the object is brighter than what is behind.
           const bool brighter_inside = here < 0;
@@ -181,7 +204,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           match.offset = place;
           match.bright_inside = brighter_inside;
           match.variance = params_.edge_sigma * params_.edge_sigma +
-                           std::pow(weakest / size, 2);
+                           std::pow(weakest / size, 2) + std::pow(crowding, 2);
         }
         if (match.found) {
           // The edge must run along the contour: its slope lies across.
@@ -201,7 +224,6 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       support.visible += match.length;
       if (match.found && std::abs(match.offset) < kSupportDistance)
         support.supported += match.length;
-      matches.push_back(match);
     }
   }
 }

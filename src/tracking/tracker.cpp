@@ -39,10 +39,11 @@ class Tracker::Impl {
       : params_(params),
         object_(object),
         camera_(camera),
-        model_(object, params.contour.points, params.contour.cache_folder),
+        model_(object, params.contour.points, params.contour.edge_radius,
+               params.contour.cache_folder),
+        filter_(params.filter),
         measurement_(params.contour, params.eyes, camera),
         refiner_(params.contour, camera),
-        filter_(params.filter),
         arena_(std::max(1, params.threads)) {
     check(camera.focal_length > 0 && camera.baseline > 0 && camera.size.area() > 0,
           "tracker: the camera needs a focal length, a baseline and a size");

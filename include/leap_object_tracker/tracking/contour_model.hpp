@@ -45,8 +45,10 @@ struct ViewChoice {
 class ContourModel {
  public:
   /// @param points scored a view, rounded up to a multiple of 16
+  /// @param edge_radius [m] of the rounding of a primitive's edges: no body is sharp
   /// @param cache_folder where the views of meshes are kept between runs; empty: nowhere
-  ContourModel(const ObjectModel& object, int points, const std::string& cache_folder = "");
+  ContourModel(const ObjectModel& object, int points, double edge_radius = 0,
+               const std::string& cache_folder = "");
   ~ContourModel();
   ContourModel(ContourModel&&) noexcept;
 

@@ -28,6 +28,7 @@ struct ContourParams {
   double truncation = 8.0;      ///< [px] edges farther away count as no edge
   double outlier_share = 0.3;   ///< prior share of contour points that no edge supports
   double edge_sigma = 0.4;      ///< [px] noise of one sub-pixel edge
+  double edge_radius = 0.0002;  ///< [m] rounding of the edges of a primitive: no body is sharp
   std::string cache_folder;     ///< views of meshes are kept here between runs; empty: nowhere
 };
 
