@@ -58,7 +58,7 @@ cv::Mat LeapSensor::expose(const cv::Mat& radiance, const SensorControls& contro
       const double counts = std::min(255.0, light.at<float>(v, u) * controls.exposure_us);
       const double shot_variance = counts / electrons_per_count;
       const double read_variance = params_.read_noise * params_.read_noise;
-      const double noise = std::sqrt((shot_variance + read_variance) / rows) * random.normal();
+      const double noise = std::sqrt((shot_variance + read_variance) / rows) * random.fastNormal();
       double value = gain * (counts + noise + fixed_noise_.at<float>(v, u)) + params_.dark_offset;
       if (controls.gamma) value = std::sqrt(std::max(0.0, value) * 255);
       image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(value);

@@ -161,6 +161,7 @@ class StereoRenderer::Impl {
     std::vector<float> vignetting;  ///< one a pixel
     std::vector<Sight> resting;     ///< pixel centres, resting bodies only
     std::vector<Sight> sights;      ///< pixel centres, all bodies
+    std::vector<float> values;      ///< [counts/us] of sights
   };
 
   void addBody(const SceneBody& body) {
@@ -215,6 +216,7 @@ class StereoRenderer::Impl {
         view.vignetting.push_back(static_cast<float>(std::pow(cosine, scene_.sensor.vignetting)));
       }
     view.sights.resize(view.rays.size());
+    view.values.resize(view.rays.size());
   }
 
   RTCScene newTopScene(const std::vector<std::uint32_t>& bodies) const {
@@ -382,8 +384,11 @@ class StereoRenderer::Impl {
                             (distance * distance);
       const Vector3f half_way = (toward_led - direction).normalized();
       const auto shininess = static_cast<float>(paint.shininess);
-      const float highlight = static_cast<float>(paint.gloss) * (shininess + 2) / 8 *
-                              std::pow(std::max(0.0F, sight.normal.dot(half_way)), shininess);
+      const float tilt_cosine = sight.normal.dot(half_way);
+      const float highlight = paint.gloss > 0 && tilt_cosine > 0
+                                  ? static_cast<float>(paint.gloss) * (shininess + 2) / 8 *
+                                        std::pow(tilt_cosine, shininess)
+                                  : 0.0F;
       const float light = falloff * cosine * (albedo + highlight);
       if (light > kUnseen * contrast_) {
         if (blocked(resting_scene_, from, span, time)) continue;
@@ -425,34 +430,40 @@ class StereoRenderer::Impl {
            static_cast<std::size_t>(u);
   }
 
-  enum class Need { kNothing, kTexture, kEdge };
-
-  /// Do the neighbours of a pixel differ so much that one ray cannot speak for it?
+  /// How many rays a pixel needs, if its neighbours differ so much that the one in its middle
+  /// cannot speak for it; else 0. The higher an edge, the more: errors stay below the sensor's
+  /// noise.
   template <class Ignore>
-  Need needOf(const std::vector<Sight>& sights, int u, int v, int reach,
+  int raysFor(const View& view, const std::vector<Sight>& sights, int u, int v, int reach,
               const Ignore& ignore) const {
     const Sight& here = sights[index(u, v)];
-    const float value = valueOf(here);
+    const float value = view.values[index(u, v)];
+    float step = 0;
     for (int y = std::max(0, v - reach); y <= std::min(scene_.mode.height - 1, v + reach); ++y)
       for (int x = std::max(0, u - reach); x <= std::min(scene_.mode.width - 1, u + reach); ++x) {
+        const float difference = std::abs(view.values[index(x, y)] - value);
+        if (difference < kUnseen * contrast_ || difference <= step) continue;
         const Sight& other = sights[index(x, y)];
         if (ignore(here, other)) continue;
-        const float difference = std::abs(valueOf(other) - value);
-        if (difference < kUnseen * contrast_) continue;
-        if (other.body != here.body || other.shaded != here.shaded) return Need::kEdge;
-        if (other.normal.dot(here.normal) < kCreaseCosine && difference > contrast_)
-          return Need::kEdge;
+        if (other.body != here.body || other.shaded != here.shaded ||
+            (other.normal.dot(here.normal) < kCreaseCosine && difference > contrast_))
+          step = difference;
       }
+    if (step > 40 * contrast_) return scene_.samples;
+    if (step > 12 * contrast_) return std::max(1, scene_.samples / 2);
+    if (step > 0) return std::max(1, scene_.samples / 4);
+
     // An even slope of light is no texture: one ray in its middle is right.
     const auto bends = [&](int du, int dv) {
       if (u < du || v < dv || u + du >= scene_.mode.width || v + dv >= scene_.mode.height)
         return false;
-      const Sight& before = sights[index(u - du, v - dv)];
-      const Sight& after = sights[index(u + du, v + dv)];
-      if (ignore(here, before) && ignore(here, after)) return false;
-      return std::abs(0.5F * (valueOf(before) + valueOf(after)) - value) > 2 * contrast_;
+      const std::size_t before = index(u - du, v - dv), after = index(u + du, v + dv);
+      if (ignore(here, sights[before]) && ignore(here, sights[after])) return false;
+      const float straight = 0.5F * (view.values[before] + view.values[after]);
+      return std::abs(straight - value) > 2 * contrast_;
     };
-    return here.body != kNothing && (bends(1, 0) || bends(0, 1)) ? Need::kTexture : Need::kNothing;
+    const bool textured = here.body != kNothing && (bends(1, 0) || bends(0, 1));
+    return textured ? std::max(1, scene_.samples / 4) : 0;
   }
 
   /// Average over rays spread evenly over the pixel, the exposure and the LEDs' area.
@@ -482,16 +493,10 @@ class StereoRenderer::Impl {
     return sum;
   }
 
-  Light lightIn(const Sight& sight) const {
-    Light light;
-    light.ambient = valueOf(sight);
-    return light;
-  }
-
-  template <class Row>
-  void eachRow(const Row& row) const {
+  template <class Pixel>
+  void eachPixel(const Pixel& pixel) const {
     tbb::parallel_for(0, scene_.mode.height, [&](int v) {
-      for (int u = 0; u < scene_.mode.width; ++u) row(u, v);
+      for (int u = 0; u < scene_.mode.width; ++u) pixel(u, v);
     });
   }
 
@@ -501,19 +506,22 @@ class StereoRenderer::Impl {
       const Met met = cast(resting_scene_, view.origin, direction, kNoDepth, time);
       return met.anything ? shade(met, direction, time, false, jitter) : Sight{};
     };
-    eachRow([&](int u, int v) {
-      centers[index(u, v)] = sample(view.rays[index(u, v)], 0.5F, Eigen::Vector2f::Zero());
+    eachPixel([&](int u, int v) {
+      const std::size_t i = index(u, v);
+      centers[i] = sample(view.rays[i], 0.5F, Eigen::Vector2f::Zero());
+      view.values[i] = valueOf(centers[i]);
     });
     view.resting = centers;
     if (resting_bodies_.empty()) return;
-    eachRow([&](int u, int v) {
-      const Need need = needOf(centers, u, v, 1, [](const Sight&, const Sight&) { return false; });
-      if (need == Need::kNothing) return;
+    eachPixel([&](int u, int v) {
+      const int rays =
+          raysFor(view, centers, u, v, 1, [](const Sight&, const Sight&) { return false; });
+      if (rays == 0) return;
       const auto light_only = [&](const Vector3f& direction, float time,
                                   const Eigen::Vector2f& jitter) {
         return sample(direction, time, jitter).light;
       };
-      view.resting[index(u, v)].light = average(lens, u, v, samplesFor(need), name, light_only);
+      view.resting[index(u, v)].light = average(lens, u, v, rays, name, light_only);
     });
   }
 
@@ -526,31 +534,37 @@ class StereoRenderer::Impl {
     return x >> 16 | x << 16;
   }
 
-  int samplesFor(Need need) const {
-    return need == Need::kEdge ? scene_.samples : std::max(1, scene_.samples / 4);
+  /// The ray in the middle of a pixel, with the moving bodies before what rests there.
+  Sight sightOfCenter(const View& view, std::size_t pixel) const {
+    const Vector3f& direction = view.rays[pixel];
+    const Sight& resting = view.resting[pixel];
+    if (nearMoving(view.origin, direction, resting.depth)) {
+      const Met met = cast(moving_scene_, view.origin, direction, resting.depth, 0.5F);
+      if (met.anything) return shade(met, direction, 0.5F, true, Eigen::Vector2f::Zero());
+    }
+    Sight sight = resting;
+    if (resting.body == kNothing) return sight;
+    const Vector3f from = view.origin + resting.depth * direction + kShadowOffset * resting.normal;
+    for (std::size_t led = 0; led < kLeds; ++led)
+      if (lit_[led] && resting.light.of_led[led] > kUnseen * contrast_ &&
+          movingShadow(from, leds_[led] - from, 0.5F))
+        sight.shaded |= static_cast<std::uint8_t>(1U << led);
+    return sight;
   }
 
   cv::Mat renderAll(View& view, const LeapLens& lens, std::uint64_t name) const {
-    eachRow([&](int u, int v) {
+    // Columns of each row that a moving body covers or shades.
+    std::vector<cv::Range> touched(static_cast<std::size_t>(scene_.mode.height),
+                                   cv::Range(scene_.mode.width, 0));
+    eachPixel([&](int u, int v) {
       const std::size_t i = index(u, v);
-      const Vector3f& direction = view.rays[i];
-      const Sight& resting = view.resting[i];
-      Sight& sight = view.sights[i];
-      sight = resting;
-      if (nearMoving(view.origin, direction, resting.depth)) {
-        const Met met = cast(moving_scene_, view.origin, direction, resting.depth, 0.5F);
-        if (met.anything) {
-          sight = shade(met, direction, 0.5F, true, Eigen::Vector2f::Zero());
-          return;
-        }
-      }
-      if (resting.body == kNothing) return;
-      const Vector3f from =
-          view.origin + resting.depth * direction + kShadowOffset * resting.normal;
-      for (std::size_t led = 0; led < kLeds; ++led)
-        if (lit_[led] && resting.light.of_led[led] > kUnseen * contrast_ &&
-            movingShadow(from, leds_[led] - from, 0.5F))
-          sight.shaded |= static_cast<std::uint8_t>(1U << led);
+      const Sight sight = sightOfCenter(view, i);
+      view.sights[i] = sight;
+      view.values[i] = valueOf(sight);
+      if (rests(sight.body) && sight.shaded == 0) return;
+      cv::Range& columns = touched[static_cast<std::size_t>(v)];
+      columns.start = std::min(columns.start, u);
+      columns.end = std::max(columns.end, u + 1);
     });
 
     // Borders between resting things are in view.resting already.
@@ -559,16 +573,24 @@ class StereoRenderer::Impl {
     };
     cv::Mat image(scene_.mode.height, scene_.mode.width, CV_32FC1);
     const int reach = 1 + blur_pixels_;
-    eachRow([&](int u, int v) {
-      const Sight& sight = view.sights[index(u, v)];
-      float value = valueOf(sight);
-      const Need need = needOf(view.sights, u, v, reach, both_rest);
-      if (need != Need::kNothing) {
+    const auto nearTouched = [&](int u, int v) {
+      for (int y = std::max(0, v - reach); y <= std::min(scene_.mode.height - 1, v + reach); ++y) {
+        const cv::Range& columns = touched[static_cast<std::size_t>(y)];
+        if (u >= columns.start - reach && u < columns.end + reach) return true;
+      }
+      return false;
+    };
+    eachPixel([&](int u, int v) {
+      float value = view.values[index(u, v)];
+      const int rays = nearTouched(u, v) ? raysFor(view, view.sights, u, v, reach, both_rest) : 0;
+      if (rays > 0) {
         const auto sample = [&](const Vector3f& direction, float time,
                                 const Eigen::Vector2f& jitter) {
-          return lightIn(sampleAll(view, direction, time, jitter));
+          Light light;
+          light.ambient = valueOf(sampleAll(view, direction, time, jitter));
+          return light;
         };
-        value = average(lens, u, v, samplesFor(need), name, sample).ambient;
+        value = average(lens, u, v, rays, name, sample).ambient;
       }
       image.at<float>(v, u) = value * view.vignetting[index(u, v)];
     });

@@ -30,6 +30,13 @@ class HashRandom {
     const double radius = std::sqrt(-2 * std::log(1 - uniform()));
     return radius * std::cos(2 * M_PI * uniform());
   }
+  /// The same to 3.4 standard deviations, as a sum of four uniform numbers: for pixels.
+  double fastNormal() {
+    const std::uint64_t parts = bits();
+    const auto sum = static_cast<double>((parts & 0xffff) + (parts >> 16 & 0xffff) +
+                                         (parts >> 32 & 0xffff) + (parts >> 48));
+    return (sum * 0x1p-16 - 2 + 2 * 0x1p-16) * 1.7320508075688772;
+  }
 
  private:
   std::uint64_t state_;
