@@ -42,6 +42,9 @@ YAML::Node loadTree(const std::string& path, int depth = 0) {
   if (root["bodies"] && root["bodies"].IsSequence())
     for (auto body : root["bodies"]) makeAbsolute(body, "file", path);
   if (!root["based_on"]) return root;
+  if (!root["based_on"].IsScalar())
+    throw std::runtime_error("scene file '" + path +
+                             "', key 'based_on': expected the path of a scene file");
   if (depth >= kDeepestBase)
     throw std::runtime_error("scene file '" + path +
                              "', key 'based_on': the files go round in a ring");

@@ -129,6 +129,11 @@ TEST_F(SceneFile, refusesARingOfBases) {
   EXPECT_THAT(complaintAbout(write("ring.yaml", "based_on: ring.yaml\n")), HasSubstr("'based_on'"));
 }
 
+TEST_F(SceneFile, refusesABaseThatIsNoPath) {
+  EXPECT_THAT(complaintAbout(write("list.yaml", "based_on: [a.yaml]\n")),
+              AllOf(HasSubstr("list.yaml"), HasSubstr("'based_on'")));
+}
+
 TEST_F(SceneFile, yieldsToWhatTheCallerSays) {
   SceneOverrides overrides;
   overrides.frames = 4;
