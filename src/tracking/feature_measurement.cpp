@@ -1,0 +1,168 @@
+#include "leap_object_tracker/tracking/feature_measurement.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace leap_object_tracker {
+namespace {
+
+constexpr double kRange = 0.03;         // [m] over which a point of something else may lie anywhere
+constexpr double kNearestDepth = 0.02;  // [m]
+constexpr double kLeastReach = 0.003;   // [m] in which the landmark of a feature is looked for
+constexpr double kLocateTolerance = 0.002;  // [m]
+constexpr double kTrusted = 0.5;            // probability that a feature belongs to the object
+
+/// log(1 + exp(x)) without overflow.
+float softplus(float x) { return x > 15 ? x : x < -15 ? 0 : std::log1p(std::exp(x)); }
+double sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
+
+Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+}  // namespace
+
+FeatureMeasurement::FeatureMeasurement(const FeatureParams& params, const ObjectModel& object,
+                                       const RectifiedStereoCamera& camera, CornerDetector detector)
+    : params_(params),
+      distance_(object),
+      radius_(radiusOf(object.mesh)),
+      extractor_(params, camera, detector),
+      landmarks_(params.landmarks) {}
+
+void FeatureMeasurement::observe(const RectifiedStereoFrame& frame,
+                                 const std::array<cv::Rect, 2>& regions, const Pose& predicted,
+                                 double uncertainty) {
+  FeatureWindow window;
+  window.regions = regions;
+  const double reach = radius_ + 3 * uncertainty;
+  window.nearest = std::max(kNearestDepth, predicted.translation().z() - reach);
+  window.farthest = std::max(2 * kNearestDepth, predicted.translation().z() + reach);
+  window.roll = landmarks_.rollOf(predicted.linear());
+  features_ = extractor_.extract(frame, window);
+  matches_ = landmarks_.match(features_, predicted, std::max(kLeastReach, 3 * uncertainty));
+  makePoints();
+}
+
+void FeatureMeasurement::makePoints() {
+  points_.clear();
+  // Densities of a mixture: of the object, or anywhere within the range.
+  const double odds = (1 - params_.outlier_share) / params_.outlier_share;
+  for (std::size_t i = 0; i < features_.size(); ++i) {
+    const StereoFeature& feature = features_[i];
+    Point point;
+    point.in_camera = feature.point_in_camera.cast<float>();
+    const double model_variance = params_.model_sigma * params_.model_sigma;
+    const Eigen::Vector3d ray = feature.point_in_camera.normalized();
+    const double variance = ray.dot(feature.covariance * ray) + model_variance;
+    point.variance = static_cast<float>(variance);
+    point.peak = static_cast<float>(std::log(odds * kRange / std::sqrt(2 * M_PI * variance)));
+    if (matches_[i] >= 0) {
+      const Landmark& landmark = landmarks_.landmarks()[static_cast<std::size_t>(matches_[i])];
+      // The landmark's own variance is the same in all directions, so that no rotation enters.
+      const Eigen::Matrix3d covariance =
+          feature.covariance + (landmark.variance + model_variance) * Eigen::Matrix3d::Identity();
+      point.has_landmark = true;
+      point.landmark = landmark.position;
+      point.information = covariance.inverse().cast<float>();
+      const double volume = std::pow(2 * M_PI, 1.5) * std::sqrt(covariance.determinant());
+      point.peak = static_cast<float>(std::log(odds * std::pow(kRange, 3) / volume));
+    }
+    points_.push_back(point);
+  }
+}
+
+void FeatureMeasurement::score(const ParticlePose* poses, std::size_t count,
+                               float* log_likelihood) const {
+  constexpr std::size_t kGrain = 64;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t i = range.begin(); i != range.end(); ++i)
+                        log_likelihood[i] = scoreOne(poses[i]);
+                    });
+}
+
+float FeatureMeasurement::scoreOne(const ParticlePose& pose) const {
+  const Eigen::Matrix3f rotation =
+      Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(pose.rotation.data());
+  const Eigen::Map<const Eigen::Vector3f> place(pose.translation.data());
+  float sum = 0;
+  for (const Point& point : points_) {
+    const Eigen::Vector3f arm = point.in_camera - place;
+    float square = 0;
+    if (point.has_landmark) {
+      const Eigen::Vector3f apart = arm - rotation * point.landmark;
+      square = apart.dot(point.information * apart);
+    } else {
+      const float distance = distance_(rotation.transpose() * arm);
+      square = distance * distance / point.variance;
+    }
+    sum += softplus(point.peak - 0.5F * square);
+  }
+  return sum;
+}
+
+FeatureSupport FeatureMeasurement::support(const Pose& camera_from_object) const {
+  FeatureSupport sums;
+  const Eigen::Matrix3d& rotation = camera_from_object.linear();
+  for (const Point& point : points_) {
+    const Eigen::Vector3d arm = point.in_camera.cast<double>() - camera_from_object.translation();
+    if (point.has_landmark) {
+      const Eigen::Vector3d turned = rotation * point.landmark.cast<double>();
+      const Eigen::Vector3d apart = arm - turned;
+      const Eigen::Matrix3d weight = point.information.cast<double>();
+      const double exponent = point.peak - 0.5 * apart.dot(weight * apart);
+      const double belongs = sigmoid(exponent);
+      Eigen::Matrix<double, 3, 6> jacobian;  // of the landmark's place by the camera twist
+      jacobian << Eigen::Matrix3d::Identity(), -skew(turned);
+      sums.information += belongs * jacobian.transpose() * weight * jacobian;
+      sums.gradient += belongs * jacobian.transpose() * weight * apart;
+      sums.log_likelihood += softplus(static_cast<float>(exponent));
+      sums.landmark_points += belongs;
+    } else {
+      Eigen::Vector3f slope;
+      const double distance = distance_((rotation.transpose() * arm).cast<float>(), slope);
+      const Eigen::Vector3d normal = rotation * slope.cast<double>();
+      const double exponent = point.peak - 0.5 * distance * distance / point.variance;
+      const double belongs = sigmoid(exponent);
+      Twist jacobian;  // of minus the distance by the camera twist
+      jacobian << normal, arm.cross(normal);
+      sums.information += belongs / point.variance * jacobian * jacobian.transpose();
+      sums.gradient += belongs / point.variance * distance * jacobian;
+      sums.log_likelihood += softplus(static_cast<float>(exponent));
+      sums.surface_points += belongs;
+    }
+  }
+  return sums;
+}
+
+void FeatureMeasurement::learn(const Pose& camera_from_object, double position_sigma,
+                               double rotation_sigma) {
+  const Pose object_from_camera = camera_from_object.inverse();
+  std::vector<bool> on_surface(features_.size(), false);
+  for (std::size_t i = 0; i < features_.size(); ++i) {
+    const Point& point = points_[i];
+    const Eigen::Vector3f spot = (object_from_camera * features_[i].point_in_camera).cast<float>();
+    const float distance = distance_(spot);
+    on_surface[i] = distance * distance < 9 * point.variance;
+    if (!point.has_landmark) continue;
+    const Eigen::Vector3d apart =
+        features_[i].point_in_camera - camera_from_object * point.landmark.cast<double>();
+    if (sigmoid(point.peak - 0.5 * apart.dot(point.information.cast<double>() * apart)) < kTrusted)
+      on_surface[i] = false;
+  }
+  const double turn = radius_ * rotation_sigma;
+  landmarks_.learn(features_, matches_, on_surface, camera_from_object,
+                   position_sigma * position_sigma + turn * turn);
+}
+
+std::optional<Pose> FeatureMeasurement::locate() const {
+  return landmarks_.locate(features_, kLocateTolerance);
+}
+
+}  // namespace leap_object_tracker
