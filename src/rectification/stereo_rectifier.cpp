@@ -1,27 +1,24 @@
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
 
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace leap_object_tracker {
 namespace {
 
 constexpr int kLargestSide = 4096;
 
-void remapTo(cv::Mat& rectified, const cv::Mat& raw, const cv::Size& expected,
-             const cv::Mat& coordinates, const cv::Mat& weights) {
-  if (raw.empty()) {
-    rectified.release();
-    return;
-  }
+/// The image as the table wants it. @throw std::invalid_argument
+cv::Mat checked(const cv::Mat& raw, const cv::Size& expected) {
+  if (raw.empty()) return {};
   if (raw.type() != CV_8UC1 || raw.size() != expected)
     throw std::invalid_argument(
         "rectify: the image is " + std::to_string(raw.cols) + "x" + std::to_string(raw.rows) +
         (raw.type() == CV_8UC1 ? "" : ", not 8-bit grey") + "; the calibration is for " +
         std::to_string(expected.width) + "x" + std::to_string(expected.height) + " 8-bit grey");
-  cv::remap(raw, rectified, coordinates, weights, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  return raw.isContinuous() ? raw : raw.clone();
 }
 
 }  // namespace
@@ -64,11 +61,11 @@ RectifiedStereoCamera rectifiedCamera(const StereoCalibration& calibration,
 StereoRectifier::StereoRectifier(const StereoCalibration& calibration,
                                  const RectifiedStereoCamera& target)
     : target_(target),
-      left_(makeEye(calibration.left, target)),
-      right_(makeEye(calibration.right, target)) {}
+      left_(makeTable(calibration.left, target)),
+      right_(makeTable(calibration.right, target)) {}
 
-StereoRectifier::Eye StereoRectifier::makeEye(const CameraCalibration& raw,
-                                              const RectifiedStereoCamera& target) {
+RemapTable StereoRectifier::makeTable(const CameraCalibration& raw,
+                                      const RectifiedStereoCamera& target) {
   constexpr float kOutside = -1e4F;
   cv::Mat map_u(target.size, CV_32FC1), map_v(target.size, CV_32FC1);
   for (int v = 0; v < target.size.height; ++v)
@@ -82,10 +79,7 @@ StereoRectifier::Eye StereoRectifier::makeEye(const CameraCalibration& raw,
       map_u.at<float>(v, u) = seen ? static_cast<float>(pixel.x()) : kOutside;
       map_v.at<float>(v, u) = seen ? static_cast<float>(pixel.y()) : kOutside;
     }
-  Eye eye;
-  eye.raw_size = raw.size;
-  cv::convertMaps(map_u, map_v, eye.coordinates, eye.weights, CV_16SC2);
-  return eye;
+  return RemapTable(map_u, map_v, raw.size);
 }
 
 RectifiedStereoFrame StereoRectifier::rectify(const RawStereoFrame& frame) const {
@@ -95,9 +89,26 @@ RectifiedStereoFrame StereoRectifier::rectify(const RawStereoFrame& frame) const
 }
 
 void StereoRectifier::rectify(const RawStereoFrame& frame, RectifiedStereoFrame& rectified) const {
+  constexpr int kStripes = 4;  // of an eye
+  const cv::Mat left = checked(frame.left, left_.sourceSize());
+  const cv::Mat right = checked(frame.right, right_.sourceSize());
   rectified.stamp = frame.stamp;
-  remapTo(rectified.left, frame.left, left_.raw_size, left_.coordinates, left_.weights);
-  remapTo(rectified.right, frame.right, right_.raw_size, right_.coordinates, right_.weights);
+  for (const auto& eye : {std::make_pair(&left, &rectified.left), {&right, &rectified.right}})
+    if (eye.first->empty())
+      eye.second->release();
+    else
+      eye.second->create(target_.size, CV_8UC1);
+  cv::parallel_for_(cv::Range(0, 2 * kStripes), [&](const cv::Range& stripes) {
+    for (int stripe = stripes.start; stripe < stripes.end; ++stripe) {
+      const bool is_left = stripe < kStripes;
+      const cv::Mat& raw = is_left ? left : right;
+      if (raw.empty()) continue;
+      const int part = stripe % kStripes, rows = target_.size.height;
+      (is_left ? left_ : right_)
+          .fillRows(raw, is_left ? rectified.left : rectified.right, rows * part / kStripes,
+                    rows * (part + 1) / kStripes);
+    }
+  });
 }
 
 }  // namespace leap_object_tracker

@@ -4,18 +4,20 @@
 
 #include "leap_object_tracker/geometry/stereo_camera.hpp"
 #include "leap_object_tracker/geometry/stereo_frame.hpp"
+#include "leap_object_tracker/rectification/remap_table.hpp"
 
 namespace leap_object_tracker {
 
 /// What the rectified pair shall look like. Zero: chosen from the calibration.
 struct RectificationParams {
-  int width = 0;                 ///< [px]; default: the raw width
-  int height = 0;                ///< [px]; default: the raw height with square pixels
-  double focal_length = 0;       ///< [px]; default: that of the raw image centre
-  double horizontal_fov_deg = 0; ///< [deg]; sets the focal length instead, if above 0
+  int width = 0;                  ///< [px]; default: the raw width
+  int height = 0;                 ///< [px]; default: the raw height with square pixels
+  double focal_length = 0;        ///< [px]; default: that of the raw image centre
+  double horizontal_fov_deg = 0;  ///< [deg]; sets the focal length instead, if above 0
 };
 
-/// The ideal pair for a calibration: square pixels, common centre, the raw resolution at the centre.
+/// The ideal pair for a calibration: square pixels, common centre, the raw resolution at the
+/// centre.
 /// @throw std::invalid_argument for a calibration without size, focal length or baseline, and for
 /// params out of range.
 RectifiedStereoCamera rectifiedCamera(const StereoCalibration& calibration,
@@ -36,16 +38,11 @@ class StereoRectifier {
   const RectifiedStereoCamera& camera() const { return target_; }
 
  private:
-  struct Eye {
-    cv::Size raw_size;
-    cv::Mat coordinates;  ///< CV_16SC2
-    cv::Mat weights;      ///< CV_16UC1
-  };
-  static Eye makeEye(const CameraCalibration& raw, const RectifiedStereoCamera& target);
+  static RemapTable makeTable(const CameraCalibration& raw, const RectifiedStereoCamera& target);
 
   RectifiedStereoCamera target_;
-  Eye left_;
-  Eye right_;
+  RemapTable left_;
+  RemapTable right_;
 };
 
 }  // namespace leap_object_tracker
