@@ -159,7 +159,7 @@ TrackerNodeParams readTrackerNodeParams(ParameterReader& reader) {
     r.read("outlier_share", p.outlier_share, {0.001, 0.99});
     r.read("edge_sigma", p.edge_sigma, {0.01, 10});
     r.read("edge_radius", p.edge_radius, {0, 0.01});
-    r.read("limb_shift", p.limb_shift, {0, 1});
+    r.read("limb_shift", p.limb_shift, {0, 5});
     std::string cache = "auto";
     r.read("cache_folder", cache);
     p.cache_folder = cache == "auto" ? usersCacheFolder() : cache;
