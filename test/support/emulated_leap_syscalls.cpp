@@ -29,13 +29,15 @@ EXPORTED int ioctl(int fd, unsigned long request, ...) noexcept {
   va_start(arguments, request);
   void* argument = va_arg(arguments, void*);
   va_end(arguments);
-  if (_IOC_TYPE(request) == 'U')
+  if (_IOC_TYPE(request) == 'U') {
+    const EmulatedFiles::Meter meter;
     if (const auto device = EmulatedFiles::instance().find(fd)) {
       const int result = device->ioctl(request, argument);
       if (result >= 0) return result;
       errno = -result;
       return -1;
     }
+  }
   static const auto real = next<int (*)(int, unsigned long, ...)>("ioctl");
   return real(fd, request, argument);
 }
@@ -44,6 +46,7 @@ EXPORTED int ioctl(int fd, unsigned long request, ...) noexcept {
 EXPORTED int poll(pollfd* fds, nfds_t count, int timeout) {
   static const auto real = next<int (*)(pollfd*, nfds_t, int)>("poll");
   const int result = real(fds, count, timeout);
+  const EmulatedFiles::Meter meter;
   for (nfds_t i = 0; result > 0 && i < count; ++i)
     if (fds[i].revents & POLLOUT) {
       const auto device = EmulatedFiles::instance().find(fds[i].fd);

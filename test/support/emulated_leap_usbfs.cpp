@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
+#include <time.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -27,6 +28,13 @@ EmulatedLeap::Setup setupFrom(const std::uint8_t* bytes) {
   setup.index = static_cast<std::uint16_t>(bytes[4] | bytes[5] << 8);
   setup.length = static_cast<std::uint16_t>(bytes[6] | bytes[7] << 8);
   return setup;
+}
+
+/// Of the calling thread.
+std::int64_t cpuNanoseconds() {
+  timespec time;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return time.tv_sec * 1000000000LL + time.tv_nsec;
 }
 
 }  // namespace
@@ -366,6 +374,13 @@ EmulatedUsbfs::Leftovers EmulatedUsbfs::leftovers() const {
 int EmulatedUsbfs::pendingTransfers() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return static_cast<int>(bulk_.size());
+}
+
+EmulatedFiles::Meter::Meter() {
+  if (instance().metered_) start_ = cpuNanoseconds();
+}
+EmulatedFiles::Meter::~Meter() {
+  if (start_ != 0) instance().metered_nanoseconds_ += cpuNanoseconds() - start_;
 }
 
 EmulatedFiles& EmulatedFiles::instance() {

@@ -110,10 +110,25 @@ class EmulatedFiles {
   void allowAll();
   bool isDenied(const char* path);
 
+  /// Adds up the CPU time of all threads that is spent for the emulation instead of in the driver,
+  /// from its construction to its destruction. Does nothing until metering is switched on.
+  class Meter {
+   public:
+    Meter();
+    ~Meter();
+
+   private:
+    std::int64_t start_ = 0;  ///< [ns]
+  };
+  void setMetered(bool metered) { metered_ = metered; }
+  double meteredSeconds() const { return 1e-9 * static_cast<double>(metered_nanoseconds_); }
+
  private:
   std::mutex mutex_;
   std::map<std::pair<unsigned long, unsigned long>, std::weak_ptr<EmulatedUsbfs>> devices_;
   std::set<std::string> denied_;
+  std::atomic<bool> metered_{false};
+  std::atomic<std::int64_t> metered_nanoseconds_{0};
 };
 
 }  // namespace leap_object_tracker
