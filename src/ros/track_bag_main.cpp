@@ -246,6 +246,10 @@ class BagTracking {
       std::printf("no true poses in the bag: no errors to print\n");
       return;
     }
+    if (poses_.empty()) {
+      std::printf("no pose to judge\n");
+      return;
+    }
     EvaluationParams evaluation;
     evaluation.frames = frames_;
     printErrors(compare(poses_, truth_, object_, evaluation));

@@ -76,6 +76,29 @@ TEST_F(RectifyNodelet, followsACameraThatChanges) {
   EXPECT_DOUBLE_EQ(info.messages()[1].P[0], 120);
 }
 
+TEST_F(RectifyNodelet, prefersTheExactMapOfALeap) {
+  ros::Publisher publisher = nh_.advertise<LeapCalibration>("/leap/calibration", 1, true);
+  ASSERT_TRUE(load("/leap/rectify", "RectifyNodelet"));
+  Inbox<sensor_msgs::CameraInfo> info(nh_, "/leap/rect/left/camera_info");
+  ASSERT_TRUE(eventually([&] { return camera_.heard() && publisher.getNumSubscribers() > 0; }));
+  LeapCalibration message;
+  message.valid = 1;
+  message.width = 64;
+  message.height = 48;
+  message.baseline = 0.04;
+  for (auto* eye : {&message.left, &message.right}) {
+    eye->fx = eye->fy = 140;
+    eye->R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  }
+  publisher.publish(message);
+  double stamp = 5;
+  EXPECT_TRUE(eventually([&] {
+    const std::size_t before = info.size();
+    publish(stamp += 1, 100);
+    return eventually([&] { return info.size() > before; }) && info.messages().back().P[0] == 140;
+  }));
+}
+
 TEST_F(RectifyNodelet, saysWhenStampsNeverAgree) {
   const LogRecorder log;
   ASSERT_TRUE(load("/leap/rectify", "RectifyNodelet"));
