@@ -85,7 +85,7 @@ Trajectory StereoBag::truth() const {
 
 std::unique_ptr<tf2::BufferCore> StereoBag::transforms() const {
   auto buffer = std::make_unique<tf2::BufferCore>(ros::Duration(1e6));
-  for (const std::string topic : {"/tf", "/tf_static"})
+  for (const std::string& topic : std::vector<std::string>{"/tf", "/tf_static"})
     for (const auto& entry : rosbag::View(bag_, rosbag::TopicQuery(topic))) {
       const auto message = entry.instantiate<tf2_msgs::TFMessage>();
       if (!message) complain(topic + " holds no tf2_msgs/TFMessage");

@@ -87,8 +87,9 @@ TEST_F(TrackBagInput, saysThatAFileIsNoBag) {
 }
 
 TEST_F(TrackBagInput, namesATopicThatIsMissing) {
-  for (const std::string topic : {"/leap/left/image_raw", "/leap/right/image_raw",
-                                  "/leap/left/camera_info", "/leap/right/camera_info"})
+  for (const std::string& topic :
+       std::vector<std::string>{"/leap/left/image_raw", "/leap/right/image_raw",
+                                "/leap/left/camera_info", "/leap/right/camera_info"})
     expectComplaint(track(writeBag({}, topic)), topic);
 }
 
@@ -193,8 +194,9 @@ TEST_F(TrackBagInput, refusesToWriteWhereItCannot) {
 }
 
 TEST_F(TrackBagInput, explainsItsUsage) {
-  for (const std::string arguments : {"", "--nonsense 3", "a.bag", "a.bag b.bag --object x --out y",
-                                      "a.bag --object x --out y --perturb 1"}) {
+  for (const std::string& arguments :
+       std::vector<std::string>{"", "--nonsense 3", "a.bag", "a.bag b.bag --object x --out y",
+                                "a.bag --object x --out y --perturb 1"}) {
     const ProgramRun run = runProgram(TRACK_BAG " " + arguments);
     EXPECT_EQ(run.exit_code, 2) << arguments;
     EXPECT_THAT(run.output, HasSubstr("usage: track_bag"));
