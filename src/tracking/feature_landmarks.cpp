@@ -16,6 +16,7 @@ constexpr float kLikeDescriptor = 0.30F;  // squared distance of unit vectors
 constexpr float kClearlyBest = 0.70F;     // squared distance to that of the second best
 constexpr float kOtherSpot = 0.0015F;     // [m] the second best must lie farther off than this
 constexpr float kSpacing = 0.0006F;       // [m] between landmarks
+constexpr float kDrift = 0.006F;          // [m] that a pose may err by when a new landmark is made
 constexpr int kForgetAfter = 30;          // frames missed, for a landmark seen only a few times
 constexpr int kWellKnown = 8;             // frames
 constexpr float kDescriptorGain = 0.1F;   // of each new sight
@@ -154,12 +155,16 @@ void LandmarkMap::learn(const std::vector<StereoFeature>& features, const std::v
       continue;
     }
     const Eigen::Vector3f view = viewOf(object_from_camera, spot);
-    const bool crowded =
+    // A spot that looks like a known one close by is that one, seen from a pose that drifted.
+    const bool known_already =
         std::any_of(landmarks_.begin(), landmarks_.end(), [&](const Landmark& landmark) {
-          return (landmark.position - spot).squaredNorm() < kSpacing * kSpacing &&
-                 landmark.view.dot(view) > 0.9F;
+          const float apart = (landmark.position - spot).squaredNorm();
+          return landmark.view.dot(view) > kSameView &&
+                 (apart < kSpacing * kSpacing ||
+                  (apart < kDrift * kDrift &&
+                   squaredDistance(landmark.descriptor, features[i].descriptor) < kLikeDescriptor));
         });
-    if (!crowded) landmarks_.push_back({spot, view, features[i].descriptor, variance, 1, 0});
+    if (!known_already) landmarks_.push_back({spot, view, features[i].descriptor, variance, 1, 0});
   }
   const Eigen::Vector3f eye = object_from_camera.translation().cast<float>();
   for (std::size_t k = 0; k < known; ++k)

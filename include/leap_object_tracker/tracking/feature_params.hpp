@@ -4,12 +4,12 @@ namespace leap_object_tracker {
 
 /// The feature likelihood: corners seen by both eyes, as points in space.
 struct FeatureParams {
-  int corners = 120;               ///< most corners an eye; the strongest that keep their distance
-  double resolution = 2700;        ///< [px/m] the object is resampled to before corners are sought
-  double least_contrast = 0.04;    ///< threshold of corners as a share of the region's contrast
-  double ratio = 0.85;             ///< nearest to second nearest descriptor of a match, at most
+  int corners = 160;               ///< most corners an eye; the strongest that keep their distance
+  double resolution = 3000;        ///< [px/m] the object is resampled to before corners are sought
+  double least_contrast = 0.02;    ///< threshold of corners as a share of the region's contrast
+  double ratio = 0.90;             ///< nearest to second nearest descriptor of a match, at most
   double epipolar_distance = 1.5;  ///< [px] between the rows of a match, at most
-  double disparity_sigma = 0.15;   ///< [px] noise of a match along the row
+  double disparity_sigma = 0.30;   ///< [px] noise of a match along the row
   double corner_sigma = 0.4;       ///< [px] how well a corner is found at the same place again
   double model_sigma = 0.0003;     ///< [m] how far the body may differ from its model
   double outlier_share = 0.3;      ///< prior share of points that are not of the object
