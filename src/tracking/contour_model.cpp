@@ -96,7 +96,7 @@ class PolyhedronTable : public ContourModel::Table {
         const Eigen::Vector3d hidden = faces_[edge.faces[first ? 1 : 0]].head<3>().cast<double>();
         outward = (hidden - seen * seen.dot(hidden)).normalized();
       }
-      segments.push_back({edge.start, edge.end, outward});
+      segments.push_back({edge.start, edge.end, outward, false});
     }
     return segments;
   }
@@ -146,7 +146,7 @@ class CylinderTable : public ContourModel::Table {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector3d normal(std::cos(limb), side * std::sin(limb), 0);
       const Eigen::Vector3d foot = radius * normal, up(0, 0, height / 2);
-      all.push_back({foot - up, foot + up, normal});
+      all.push_back({foot - up, foot + up, normal, true});
     }
     for (const int end : {-1, 1})
       addRim(radius, height, edge_radius, end, [&](double angle, const Eigen::Vector3d& radial) {
@@ -180,7 +180,7 @@ class CylinderTable : public ContourModel::Table {
       const double angle = -M_PI + (i + 0.5) * piece;
       const Eigen::Vector3d radial(std::cos(angle), std::sin(angle), 0);
       const auto [visible, outward] = judge(angle, radial);
-      if (visible) all.push_back({at(angle - piece / 2), at(angle + piece / 2), outward});
+      if (visible) all.push_back({at(angle - piece / 2), at(angle + piece / 2), outward, false});
     }
   }
 

@@ -25,6 +25,7 @@ std::vector<ContourPoint> spread(const std::vector<ContourSegment>& segments, in
       point.tangent = (along / length).cast<float>();
       point.outward = segment.outward.cast<float>();
       point.length = static_cast<float>(step);
+      point.limb = segment.limb ? 1.0F : 0.0F;
       points.push_back(point);
     }
     passed += length;

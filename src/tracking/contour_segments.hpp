@@ -13,6 +13,7 @@ namespace leap_object_tracker {
 struct ContourSegment {
   Eigen::Vector3d start, end;
   Eigen::Vector3d outward;  ///< as in ContourPoint
+  bool limb = false;        ///< as in ContourPoint
 };
 
 /// Spreads the points of a view evenly over the length of its segments.

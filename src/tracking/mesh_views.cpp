@@ -422,7 +422,7 @@ class ContourFinder {
     if (!(half.norm() > 1e-9 * radius_)) return;
     const Vector3d middle = (start + end) / 2;
     const Vector3d outward = normal.dot(awayInImage(edge, ray)) < 0 ? Vector3d(-normal) : normal;
-    segments.push_back({middle - half, middle + half, outward});
+    segments.push_back({middle - half, middle + half, outward, true});
   }
 
   Mesh mesh_;
@@ -524,8 +524,8 @@ class ViewFile {
   }
 
  private:
-  static constexpr std::uint64_t kVersion = 1;  ///< of the format and of how views are found
-  static constexpr std::size_t kPointBytes = 40;
+  static constexpr std::uint64_t kVersion = 2;  ///< of the format and of how views are found
+  static constexpr std::size_t kPointBytes = 44;
   static_assert(sizeof(ContourPoint) == kPointBytes, "written as bytes");
 
   template <class T>

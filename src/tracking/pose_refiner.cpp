@@ -143,6 +143,8 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       match.jacobian.tail<3>() = -(row * skew(arm)).transpose();
       match.samples = std::min(1.0, match.length / kIndependentLength);
       match.place = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
+      if (point.limb > 0)
+        match.place -= static_cast<float>(params_.limb_shift) * normal.cast<float>();
       match.normal = normal.cast<float>();
       matches.push_back(match);
     }

@@ -12,6 +12,7 @@
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/pose_belief.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
+#include "leap_object_tracker/tracking/pose_search.hpp"
 
 namespace leap_object_tracker {
 namespace {
@@ -26,6 +27,10 @@ constexpr double kLongestStep = 0.25;   // [s] longer gaps count as this long
 constexpr int kHypotheses = 4;          // refined a frame
 constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
 constexpr int kPatience = 3;            // frames below it before the object counts as lost
+constexpr double kFoundSupport = 0.6;   // share of the contour that a found pose must have
+constexpr int kNearFrames = 30;         // for which a lost object is looked for near its last pose
+constexpr double kFoundPositionSigma = 0.003;  // [m]
+constexpr double kFoundRotationSigma = 0.05;   // [rad]
 
 void check(bool right, const char* message) {
   if (!right) throw std::invalid_argument(message);
@@ -44,6 +49,7 @@ class Tracker::Impl {
         filter_(params.filter),
         measurement_(params.contour, params.eyes, camera),
         refiner_(params.contour, camera),
+        search_(params, object_, model_, camera),
         arena_(std::max(1, params.threads)) {
     check(camera.focal_length > 0 && camera.baseline > 0 && camera.size.area() > 0,
           "tracker: the camera needs a focal length, a baseline and a size");
@@ -70,12 +76,16 @@ class Tracker::Impl {
     report_.state = TrackerState::kTracking;
     weak_frames_ = 0;
     fresh_ = true;
+    confirming_ = false;
+    last_seen_.reset();
     last_stamp_.reset();
   }
 
   void search() {
     report_.state = TrackerState::kSearching;
     last_stamp_.reset();
+    last_seen_.reset();
+    confirming_ = false;
   }
 
   void stop() {
@@ -101,10 +111,13 @@ class Tracker::Impl {
   std::optional<PoseEstimate> trackInArena(const RectifiedStereoFrame& frame,
                                            const std::optional<Pose>& fixed_from_camera) {
     report_.edges_ms = report_.filter_ms = report_.search_ms = 0;
-    if (report_.state == TrackerState::kIdle || report_.state == TrackerState::kSearching)
-      return std::nullopt;
+    if (report_.state == TrackerState::kIdle) return std::nullopt;
 
     const Pose camera_motion = cameraMotion(fixed_from_camera);
+    if (report_.state != TrackerState::kTracking && !confirming_) {
+      lookFor(frame, camera_motion);
+      return std::nullopt;
+    }
     predict(frame.stamp, camera_motion);
 
     auto started = Clock::now();
@@ -124,6 +137,29 @@ class Tracker::Impl {
     estimate.covariance = belief_.poseCovariance();
     estimate.support = report_.support;
     return estimate;
+  }
+
+  /// Searches one frame; a pose that is well supported must prove itself in the next one.
+  void lookFor(const RectifiedStereoFrame& frame, const Pose& camera_motion) {
+    const auto started = Clock::now();
+    if (last_seen_) last_seen_ = camera_motion * *last_seen_;
+    const std::optional<RefinedPose> found = search_.find(frame, last_seen_);
+    report_.search_ms = millisecondsSince(started);
+    report_.support = found ? found->support() : 0;
+    if (!found || report_.support < kFoundSupport) {
+      if (++frames_lost_ > kNearFrames) last_seen_.reset(), report_.state = TrackerState::kSearching;
+      return;
+    }
+    Pose pose = found->camera_from_object;
+    if (last_seen_) pose = nearestEquivalent(pose, *last_seen_, object_.symmetry);
+    belief_ = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
+    filter_.initialize(belief_.pose, belief_.poseCovariance(), belief_.velocity,
+                       belief_.velocityCovariance());
+    bright_inside_ = std::clamp(found->bright_inside, 0.3, 0.9);
+    last_stamp_ = frame.stamp;
+    weak_frames_ = 0;
+    fresh_ = true;
+    confirming_ = true;
   }
 
   Pose cameraMotion(const std::optional<Pose>& fixed_from_camera) {
@@ -233,13 +269,20 @@ class Tracker::Impl {
   void takeOver(const RefinedPose& refined) {
     report_.support = refined.support();
     const bool supported = report_.support >= kLeastSupport;
+    if (confirming_) {
+      confirming_ = false;
+      frames_lost_ = 0;
+      if (report_.support < kFoundSupport) return;
+    }
     if (supported) {
       belief_.update(refined.camera_from_object, refined.information);
       bright_inside_ = std::clamp(0.9 * bright_inside_ + 0.1 * refined.bright_inside, 0.2, 0.95);
       weak_frames_ = 0;
+      last_seen_ = belief_.pose;
       report_.state = TrackerState::kTracking;
     } else if (++weak_frames_ >= kPatience) {
       report_.state = TrackerState::kLost;
+      frames_lost_ = 0;
     }
     fresh_ = false;
     filter_.resample(params_.filter.resample_below);
@@ -250,6 +293,7 @@ class Tracker::Impl {
 
   ContourMeasurement measurement_;
   PoseRefiner refiner_;
+  PoseSearch search_;
   tbb::task_arena arena_;
   std::array<Eigen::Vector3d, 8> corners_;
   PoseBelief belief_;
@@ -257,7 +301,10 @@ class Tracker::Impl {
   std::optional<Pose> last_fixed_from_camera_;
   double bright_inside_ = 0.7;
   int weak_frames_ = 0;
+  int frames_lost_ = 0;
   bool fresh_ = false;
+  bool confirming_ = false;          ///< the last search found something
+  std::optional<Pose> last_seen_;    ///< where the object was when the tracker stood by it
 };
 
 Tracker::Tracker(const TrackerParams& params, const ObjectModel& object,

@@ -16,6 +16,7 @@ struct ContourPoint {
   Eigen::Vector3f tangent;   ///< unit vector along the contour
   Eigen::Vector3f outward;   ///< off the body, where only one side of the contour is body; else zero
   float length = 0;          ///< [m] of contour that the point stands for
+  float limb = 0;            ///< 1 where a curved surface turns away, 0 at an edge of the body
 
   bool outline() const { return outward.squaredNorm() > 0.5F; }
 };

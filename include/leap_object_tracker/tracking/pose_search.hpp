@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "leap_object_tracker/geometry/object_model.hpp"
+#include "leap_object_tracker/geometry/stereo_camera.hpp"
+#include "leap_object_tracker/geometry/stereo_frame.hpp"
+#include "leap_object_tracker/tracking/contour_kernel.hpp"
+#include "leap_object_tracker/tracking/contour_model.hpp"
+#include "leap_object_tracker/tracking/edge_field.hpp"
+#include "leap_object_tracker/tracking/pose_refiner.hpp"
+#include "leap_object_tracker/tracking/tracker_params.hpp"
+
+namespace leap_object_tracker {
+
+/// Finds an object anywhere in the working volume, in one frame.
+///
+/// 1. Places: bright blobs of the left eye at several thresholds whose size fits the object; depth
+///    from the same blob in the right eye, else from the blob's area (the mean projected area of a
+///    convex body is a quarter of its surface, Cauchy 1832).
+/// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
+///    of equivalent ones, at each place; scored by the blunt contour likelihood.
+/// 3. The best ones move in random steps that shrink, then are refined on sub-pixel edges.
+class PoseSearch {
+ public:
+  PoseSearch(const TrackerParams& params, const ObjectModel& object, const ContourModel& model,
+             const RectifiedStereoCamera& camera);
+
+  /// @param near camera_from_object of a pose near which to look as well
+  /// @return the best pose found, whether good or not; nothing if no place looks like the object.
+  std::optional<RefinedPose> find(const RectifiedStereoFrame& frame,
+                                  const std::optional<Pose>& near);
+
+  int orientations() const { return static_cast<int>(orientations_.size()); }
+
+ private:
+  struct Hypothesis {
+    ParticlePose pose;
+    float score = 0;
+  };
+  struct Blob {
+    double u = 0, v = 0, area = 0, width = 0, height = 0;
+    int threshold = 0;
+  };
+
+  std::vector<Blob> findBlobs(const cv::Mat& image) const;
+  std::vector<Eigen::Vector3d> findPlaces(const RectifiedStereoFrame& frame) const;
+  void scoreAll(std::vector<Hypothesis>& hypotheses, const std::array<GainMap, 2>& maps) const;
+  const std::array<GainMap, 2>& mapsFor(double depth) const;
+
+  TrackerParams params_;
+  RectifiedStereoCamera camera_;
+  const ContourModel* model_;
+  PoseRefiner refiner_;
+  double surface_ = 0;  ///< [m^2]
+  Symmetry symmetry_;
+  std::vector<Eigen::Matrix3d> orientations_;
+  std::array<EdgeField, 2> fields_;
+  std::array<std::array<GainMap, 2>, 3> maps_;  ///< by cell size 2, 4, 8 px; by eye
+  std::uint64_t calls_ = 0;
+};
+
+}  // namespace leap_object_tracker

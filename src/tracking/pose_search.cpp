@@ -1,0 +1,290 @@
+#include "leap_object_tracker/tracking/pose_search.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "tracking/random.hpp"
+
+namespace leap_object_tracker {
+namespace {
+
+constexpr int kOrientations = 4400;     // about 15 deg apart over all of SO(3)
+constexpr int kMostPlaces = 14;
+constexpr std::size_t kKept = 96;       // hypotheses that move on
+constexpr int kChildren = 32;           // random steps of each, a round
+constexpr int kRounds = 3;
+constexpr std::size_t kRefined = 10;
+constexpr EdgeKernel kBlunt{3.0F, 3.0F};
+
+/// Even set over SO(3) (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1).
+std::vector<Eigen::Matrix3d> evenRotations(int count) {
+  constexpr double kPhi = 1.4142135623730951, kPsi = 1.533751168755204288118041;
+  std::vector<Eigen::Matrix3d> rotations;
+  for (int i = 0; i < count; ++i) {
+    const double s = i + 0.5, r = std::sqrt(s / count), big = std::sqrt(1 - s / count);
+    const double alpha = 2 * M_PI * s / kPhi, beta = 2 * M_PI * s / kPsi;
+    rotations.push_back(Eigen::Quaterniond(big * std::cos(beta), r * std::sin(alpha),
+                                           r * std::cos(alpha), big * std::sin(beta))
+                            .normalized()
+                            .toRotationMatrix());
+  }
+  return rotations;
+}
+
+/// One of each class of orientations that look the same.
+std::vector<Eigen::Matrix3d> distinctRotations(const Symmetry& symmetry, int count) {
+  std::vector<Eigen::Matrix3d> kept;
+  if (symmetry.hasFreeAxis()) {
+    // Only the direction of the axis matters: as many as there are 15 deg caps on a sphere.
+    const int directions = 240;
+    for (int i = 0; i < directions; ++i) {
+      const double z = 1 - (2 * i + 1.0) / directions, ring = std::sqrt(1 - z * z);
+      const double angle = i * M_PI * (3 - std::sqrt(5.0));
+      const Eigen::Vector3d axis(ring * std::cos(angle), ring * std::sin(angle), z);
+      kept.push_back(
+          Eigen::Quaterniond::FromTwoVectors(symmetry.free_axis, axis).toRotationMatrix());
+    }
+    return kept;
+  }
+  for (const auto& rotation : evenRotations(count)) {
+    const double trace = rotation.trace();
+    const bool nearest =
+        std::all_of(symmetry.rotations.begin(), symmetry.rotations.end(),
+                    [&](const Eigen::Matrix3d& g) { return (rotation * g).trace() <= trace + 1e-9; });
+    if (nearest) kept.push_back(rotation);
+  }
+  return kept;
+}
+
+double surfaceOf(const Mesh& mesh) {
+  double doubled = 0;
+  for (const auto& t : mesh.triangles)
+    doubled += (mesh.vertices[t[1]] - mesh.vertices[t[0]])
+                   .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]])
+                   .norm();
+  return doubled / 2;
+}
+
+}  // namespace
+
+PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
+                       const ContourModel& model, const RectifiedStereoCamera& camera)
+    : params_(params),
+      camera_(camera),
+      model_(&model),
+      refiner_(params.contour, camera),
+      surface_(surfaceOf(object.mesh)),
+      symmetry_(object.symmetry),
+      orientations_(distinctRotations(object.symmetry, kOrientations)) {}
+
+std::vector<PoseSearch::Blob> PoseSearch::findBlobs(const cv::Mat& image) const {
+  std::vector<Blob> blobs;
+  if (image.empty()) return blobs;
+  cv::Mat half, mask, labels, statistics, centroids;
+  cv::resize(image, half, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
+  for (const int threshold : {12, 20, 32, 50, 80, 120, 170}) {
+    mask = half > threshold;
+    const int count = cv::connectedComponentsWithStats(mask, labels, statistics, centroids, 8);
+    for (int i = 1; i < count; ++i) {
+      Blob blob;
+      blob.area = 4.0 * statistics.at<int>(i, cv::CC_STAT_AREA);
+      if (blob.area < 40) continue;
+      blob.width = 2.0 * statistics.at<int>(i, cv::CC_STAT_WIDTH);
+      blob.height = 2.0 * statistics.at<int>(i, cv::CC_STAT_HEIGHT);
+      blob.u = 2 * centroids.at<double>(i, 0) + 0.5;
+      blob.v = 2 * centroids.at<double>(i, 1) + 0.5;
+      blob.threshold = threshold;
+      blobs.push_back(blob);
+    }
+  }
+  return blobs;
+}
+
+std::vector<Eigen::Vector3d> PoseSearch::findPlaces(const RectifiedStereoFrame& frame) const {
+  struct Place {
+    Eigen::Vector3d point;
+    double doubt;
+  };
+  std::vector<Place> places;
+  const double focal = camera_.focal_length;
+  const bool left_used = params_.eyes != Eyes::kRight && !frame.left.empty();
+  const std::vector<Blob> left = left_used ? findBlobs(frame.left) : std::vector<Blob>();
+  const std::vector<Blob> right =
+      params_.eyes != Eyes::kLeft ? findBlobs(frame.right) : std::vector<Blob>();
+  const auto add = [&](const Blob& blob, double depth, double doubt, double eye_x) {
+    if (depth < params_.volume.nearest || depth > params_.volume.farthest) return;
+    const double expected = surface_ / 4 * focal * focal / (depth * depth);
+    const double misfit = std::abs(std::log(blob.area / expected));
+    if (misfit > std::log(4.0)) return;
+    places.push_back({{eye_x + (blob.u - camera_.center_u) * depth / focal,
+                       (blob.v - camera_.center_v) * depth / focal, depth},
+                      misfit + doubt});
+  };
+  const double half_radius = 0.35 * model_->radius();
+  for (const Blob& blob : left) {
+    for (const Blob& other : right) {
+      if (other.threshold != blob.threshold) continue;
+      if (std::abs(other.v - blob.v) > 4 + 0.25 * blob.height) continue;
+      if (std::abs(std::log(other.area / blob.area)) > 0.7) continue;
+      const double disparity = blob.u - other.u;
+      if (disparity < 2) continue;
+      // The blob is the near side of the object.
+      add(blob, focal * camera_.baseline / disparity + half_radius,
+          std::abs(std::log(other.area / blob.area)) + std::abs(other.v - blob.v) / 20, 0);
+    }
+    add(blob, focal * std::sqrt(surface_ / 4 / blob.area), 0.5, 0);
+  }
+  if (!left_used)
+    for (const Blob& blob : right)
+      add(blob, focal * std::sqrt(surface_ / 4 / blob.area), 0.5, camera_.baseline);
+
+  std::sort(places.begin(), places.end(),
+            [](const Place& a, const Place& b) { return a.doubt < b.doubt; });
+  std::vector<Eigen::Vector3d> chosen;
+  for (const Place& place : places) {
+    const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Eigen::Vector3d& other) {
+      return (other - place.point).norm() < 0.35 * model_->radius() &&
+             std::abs(std::log(other.z() / place.point.z())) < 0.1;
+    });
+    if (!known) chosen.push_back(place.point);
+    if (chosen.size() >= kMostPlaces) break;
+  }
+  return chosen;
+}
+
+const std::array<GainMap, 2>& PoseSearch::mapsFor(double depth) const {
+  const double radius = camera_.focal_length * model_->radius() / depth;
+  return maps_[radius < 40 ? 0 : radius < 90 ? 1 : 2];
+}
+
+void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses,
+                          const std::array<GainMap, 2>& maps) const {
+  std::array<EyeView, 2> eyes;
+  for (std::size_t eye = 0; eye < 2; ++eye) {
+    if (fields_[eye].seen()) eyes[eye].map = &maps[eye];
+    eyes[eye].focal_length = static_cast<float>(camera_.focal_length);
+    eyes[eye].center_u = static_cast<float>(camera_.center_u);
+    eyes[eye].center_v = static_cast<float>(camera_.center_v);
+    eyes[eye].eye_x = eye == 0 ? 0 : static_cast<float>(camera_.baseline);
+  }
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hypotheses.size(), 256),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t i = range.begin(); i != range.end(); ++i)
+                        scoreContours(*model_, eyes.data(), eyes.size(), 1 / 3.0F,
+                                      &hypotheses[i].pose, 1, &hypotheses[i].score);
+                    });
+}
+
+std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
+                                            const std::optional<Pose>& near) {
+  ++calls_;
+  const cv::Rect whole(cv::Point(), camera_.size);
+  tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
+    const bool used =
+        params_.eyes == Eyes::kBoth || params_.eyes == (eye == 0 ? Eyes::kLeft : Eyes::kRight);
+    fields_[eye].build(used ? (eye == 0 ? frame.left : frame.right) : cv::Mat(), whole);
+    if (!fields_[eye].seen()) return;
+    for (std::size_t level = 0; level < maps_.size(); ++level)
+      fields_[eye].transform(kBlunt, 2 << level, maps_[level][eye]);
+  });
+
+  std::vector<Eigen::Vector3d> places = findPlaces(frame);
+  std::vector<Hypothesis> kept;
+  const auto keepBest = [](std::vector<Hypothesis>& all, std::size_t count) {
+    count = std::min(count, all.size());
+    std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count), all.end(),
+                      [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
+    all.resize(count);
+  };
+  std::vector<Hypothesis> hypotheses;
+  for (const Eigen::Vector3d& place : places) {
+    hypotheses.clear();
+    for (const double stretch : {0.93, 1.0, 1.07}) {
+      // Orientations are laid out as seen along the ray to the place.
+      const Eigen::Matrix3d facing =
+          Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), place).toRotationMatrix();
+      for (const auto& orientation : orientations_) {
+        Pose pose = Pose::Identity();
+        pose.translation() = place * stretch;
+        pose.linear() = facing * orientation;
+        hypotheses.push_back({toParticlePose(pose), 0});
+      }
+    }
+    scoreAll(hypotheses, mapsFor(place.z()));
+    keepBest(hypotheses, 32);
+    kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
+  }
+  if (near) {
+    hypotheses.clear();
+    for (std::uint64_t i = 0; i < 3000; ++i) {
+      CounterRandom random(params_.filter.seed, 7'000'000 + calls_, i);
+      const auto normals = random.sixNormals();
+      const double reach = i % 3 == 0 ? 0.3 : i % 3 == 1 ? 1.0 : 2.5;
+      Twist step;
+      for (int k = 0; k < 6; ++k)
+        step[k] = reach * (k < 3 ? 0.01 : 0.12) *
+                  static_cast<double>(normals[static_cast<std::size_t>(k)]);
+      hypotheses.push_back({toParticlePose(movedInCamera(*near, step)), 0});
+    }
+    scoreAll(hypotheses, mapsFor(std::max(0.03, near->translation().z())));
+    keepBest(hypotheses, 32);
+    kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
+  }
+  if (kept.empty()) return std::nullopt;
+  keepBest(kept, kKept);
+
+  // Each of the kept moves to the best of its children, in steps that shrink.
+  for (int round = 0; round < kRounds; ++round) {
+    const double size = std::pow(0.55, round);
+    tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t i) {
+      const Pose parent = toPose(kept[i].pose);
+      const double depth = std::max(0.03, parent.translation().z());
+      std::vector<Hypothesis> children{kept[i]};
+      for (int child = 0; child < kChildren; ++child) {
+        CounterRandom random(params_.filter.seed + calls_, static_cast<std::uint64_t>(round) + 100,
+                             i * kChildren + static_cast<std::uint64_t>(child));
+        const auto normals = random.sixNormals();
+        Twist step;
+        for (int k = 0; k < 6; ++k)
+          step[k] = size * (k < 3 ? 0.12 * model_->radius() : 0.12) *
+                    static_cast<double>(normals[static_cast<std::size_t>(k)]);
+        // Along the ray the place is less well known.
+        step.head<3>() += parent.translation().normalized() * (size * 0.03 * depth *
+                                                               static_cast<double>(normals[2]));
+        children.push_back({toParticlePose(movedInCamera(parent, step)), 0});
+      }
+      scoreAll(children, mapsFor(depth));
+      kept[i] = *std::max_element(
+          children.begin(), children.end(),
+          [](const Hypothesis& a, const Hypothesis& b) { return a.score < b.score; });
+    });
+  }
+  keepBest(kept, kept.size());
+
+  std::vector<Pose> starts;
+  for (const Hypothesis& hypothesis : kept) {
+    const Pose pose = toPose(hypothesis.pose);
+    const bool known = std::any_of(starts.begin(), starts.end(), [&](const Pose& other) {
+      return (pose.translation() - other.translation()).norm() < 0.25 * model_->radius() &&
+             angleBetween(pose.linear(), other.linear(), symmetry_) < 0.2;
+    });
+    if (!known) starts.push_back(pose);
+    if (starts.size() >= kRefined) break;
+  }
+  std::vector<RefinedPose> refined(starts.size());
+  tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
+    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, 0.7, {10, 8, 6, 4, 3, 2.5});
+  });
+  const auto best = std::max_element(
+      refined.begin(), refined.end(),
+      [](const RefinedPose& a, const RefinedPose& b) { return a.log_likelihood < b.log_likelihood; });
+  const double depth = best->camera_from_object.translation().z();
+  if (depth < params_.volume.nearest || depth > params_.volume.farthest) return std::nullopt;
+  return *best;
+}
+
+}  // namespace leap_object_tracker
