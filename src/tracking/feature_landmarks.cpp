@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <opencv2/core/persistence.hpp>
 #include <random>
@@ -276,11 +277,11 @@ void LandmarkMap::load(const std::string& path, const std::string& object_name) 
   const auto complain = [&](const std::string& what) {
     throw std::runtime_error("landmarks '" + path + "': " + what);
   };
+  if (!std::ifstream(path)) complain("cannot be read");
   std::string format, object;
   cv::Mat table, views;
   try {
     cv::FileStorage file(path, cv::FileStorage::READ);
-    if (!file.isOpened()) complain("cannot be read");
     file["format"] >> format;
     file["object"] >> object;
     file["landmarks"] >> table;
