@@ -4,6 +4,7 @@
 // Highway wants its own header after foreach_target.h.
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -16,8 +17,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Sum of projected length times gain of one view in one eye, in grey steps times cells.
 /// @param r camera_from_object, row by row, @param t its translation in the frame of this eye
-float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, const float* HWY_RESTRICT r,
-                const float* HWY_RESTRICT t, const EyeView& eye) {
+float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, std::size_t scored,
+                const float* HWY_RESTRICT r, const float* HWY_RESTRICT t, const EyeView& eye) {
   const hn::ScalableTag<float> df;
   const hn::RebindToSigned<decltype(df)> di;
   const std::size_t lanes = hn::Lanes(df);
@@ -45,7 +46,7 @@ float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, const floa
   const auto t0 = hn::Set(df, t[0]), t1 = hn::Set(df, t[1]), t2 = hn::Set(df, t[2]);
 
   auto sum = hn::Zero(df);
-  for (std::size_t i = 0; i < points; i += lanes) {
+  for (std::size_t i = 0; i < scored; i += lanes) {
     const auto x = hn::LoadU(df, arrays + i);
     const auto y = hn::LoadU(df, arrays + points + i);
     const auto z = hn::LoadU(df, arrays + 2 * points + i);
@@ -97,9 +98,9 @@ float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, const floa
   return hn::GetLane(hn::SumOfLanes(df, sum));
 }
 
-void scorePoses(const ContourModel& model, const EyeView* eyes, std::size_t eye_count,
-                float independent_share, const ParticlePose* poses, std::size_t count,
-                float* log_likelihood) {
+void scorePoses(const ContourModel& model, std::size_t points, const EyeView* eyes,
+                std::size_t eye_count, float independent_share, const ParticlePose* poses,
+                std::size_t count, float* log_likelihood) {
   for (std::size_t i = 0; i < count; ++i) {
     const float* r = poses[i].rotation.data();
     float total = 0;
@@ -120,7 +121,8 @@ void scorePoses(const ContourModel& model, const EyeView* eyes, std::size_t eye_
         turned[k + 2] = r[k + 2];
       }
       const float sum = scoreView(choice.view->arrays.data(),
-                                  static_cast<std::size_t>(model.points()), turned, t, eye);
+                                  static_cast<std::size_t>(model.points()), points, turned, t,
+                                  eye);
       total += sum * eye.map->nats_per_step / eye.map->cells_per_pixel;
     }
     log_likelihood[i] = std::isfinite(total) ? total * independent_share : 0.0F;
@@ -139,11 +141,12 @@ namespace leap_object_tracker {
 
 HWY_EXPORT(scorePoses);
 
-void scoreContours(const ContourModel& model, const EyeView* eyes, std::size_t eye_count,
-                   float independent_share, const ParticlePose* poses, std::size_t count,
-                   float* log_likelihood) {
+void scoreContours(const ContourModel& model, int points, const EyeView* eyes,
+                   std::size_t eye_count, float independent_share, const ParticlePose* poses,
+                   std::size_t count, float* log_likelihood) {
+  const auto scored = static_cast<std::size_t>(std::clamp(points, 16, model.points()) / 16 * 16);
   HWY_DYNAMIC_DISPATCH(scorePoses)
-  (model, eyes, eye_count, independent_share, poses, count, log_likelihood);
+  (model, scored, eyes, eye_count, independent_share, poses, count, log_likelihood);
 }
 
 std::vector<std::string> contourKernelTargets() {

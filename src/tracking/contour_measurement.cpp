@@ -53,7 +53,8 @@ void ContourMeasurement::score(const ContourModel& model, Sharpness sharpness,
     eyes[eye].center_v = static_cast<float>(camera_.center_v);
     eyes[eye].eye_x = eye == 0 ? 0 : static_cast<float>(camera_.baseline);
   }
-  scoreContours(model, eyes.data(), eyes.size(), kIndependentShare, poses, count, log_likelihood);
+  scoreContours(model, model.points(), eyes.data(), eyes.size(), kIndependentShare, poses, count,
+                log_likelihood);
 }
 
 }  // namespace leap_object_tracker

@@ -42,9 +42,11 @@ void fillArrays(ContourView& view, const std::vector<ContourPoint>& scored, int 
     // Padding repeats a place with no length, so that it weighs nothing.
     const ContourPoint& point = scored[std::min(i, scored.size() - 1)];
     const float length = i < scored.size() ? point.length : 0.0F;
+    // Every n/16-th point stands in one group of 16, so that any first groups are an even sample.
+    const std::size_t groups = n / 16, slot = (i % groups) * 16 + i / groups;
     for (std::size_t k = 0; k < 3; ++k) {
-      view.arrays[k * n + i] = point.position[static_cast<Eigen::Index>(k)];
-      view.arrays[(3 + k) * n + i] = length * point.tangent[static_cast<Eigen::Index>(k)];
+      view.arrays[k * n + slot] = point.position[static_cast<Eigen::Index>(k)];
+      view.arrays[(3 + k) * n + slot] = length * point.tangent[static_cast<Eigen::Index>(k)];
     }
   }
 }

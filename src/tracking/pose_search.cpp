@@ -14,10 +14,14 @@ namespace {
 
 constexpr int kOrientations = 4400;     // about 15 deg apart over all of SO(3)
 constexpr int kMostPlaces = 14;
-constexpr std::size_t kKept = 96;       // hypotheses that move on
-constexpr int kChildren = 32;           // random steps of each, a round
-constexpr int kRounds = 3;
-constexpr std::size_t kRefined = 10;
+constexpr int kCoarsePoints = 32;       // of the contour, for the first look
+constexpr std::size_t kLikelyPlaces = 3;   // first by how well their blob fits
+constexpr std::size_t kKeptAtLikely = 40;  // hypotheses of such a place that move on
+constexpr std::size_t kKeptElsewhere = 8;
+constexpr int kChildren = 20;              // random steps of each, a round
+constexpr int kRounds = 4;
+constexpr std::size_t kRefinedAtLikely = 8;
+constexpr std::size_t kRefinedElsewhere = 2;
 constexpr EdgeKernel kBlunt{3.0F, 3.0F};
 
 /// Even set over SO(3) (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1).
@@ -156,12 +160,13 @@ std::vector<Eigen::Vector3d> PoseSearch::findPlaces(const RectifiedStereoFrame& 
   return chosen;
 }
 
-const std::array<GainMap, 2>& PoseSearch::mapsFor(double depth) const {
+const std::array<GainMap, 2>& PoseSearch::mapsFor(double depth, int sharpening) const {
   const double radius = camera_.focal_length * model_->radius() / depth;
-  return maps_[radius < 40 ? 0 : radius < 90 ? 1 : 2];
+  const int level = radius < 30 ? 1 : radius < 80 ? 2 : 3;
+  return maps_[static_cast<std::size_t>(std::max(0, level - sharpening))];
 }
 
-void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses,
+void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses, int points,
                           const std::array<GainMap, 2>& maps) const {
   std::array<EyeView, 2> eyes;
   for (std::size_t eye = 0; eye < 2; ++eye) {
@@ -174,7 +179,7 @@ void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses,
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hypotheses.size(), 256),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       for (std::size_t i = range.begin(); i != range.end(); ++i)
-                        scoreContours(*model_, eyes.data(), eyes.size(), 1 / 3.0F,
+                        scoreContours(*model_, points, eyes.data(), eyes.size(), 1 / 3.0F,
                                       &hypotheses[i].pose, 1, &hypotheses[i].score);
                     });
 }
@@ -189,19 +194,33 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     fields_[eye].build(used ? (eye == 0 ? frame.left : frame.right) : cv::Mat(), whole);
     if (!fields_[eye].seen()) return;
     for (std::size_t level = 0; level < maps_.size(); ++level)
-      fields_[eye].transform(kBlunt, 2 << level, maps_[level][eye]);
+      fields_[eye].transform(kBlunt, 1 << level, maps_[level][eye]);
   });
 
   std::vector<Eigen::Vector3d> places = findPlaces(frame);
   std::vector<Hypothesis> kept;
-  const auto keepBest = [](std::vector<Hypothesis>& all, std::size_t count) {
-    count = std::min(count, all.size());
-    std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count), all.end(),
+  // Best first, none of them within `apart` [rad] of a better one.
+  const auto keepDistinct = [&](std::vector<Hypothesis>& all, std::size_t count, double apart) {
+    const std::size_t looked_at = std::min(12 * count, all.size());
+    std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(looked_at), all.end(),
                       [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
-    all.resize(count);
+    std::vector<Hypothesis> distinct;
+    std::vector<Pose> poses;
+    for (std::size_t i = 0; i < looked_at && distinct.size() < count; ++i) {
+      const Pose pose = toPose(all[i].pose);
+      const bool known = std::any_of(poses.begin(), poses.end(), [&](const Pose& other) {
+        return (pose.translation() - other.translation()).norm() < apart * model_->radius() &&
+               angleBetween(pose.linear(), other.linear(), symmetry_) < apart;
+      });
+      if (known) continue;
+      poses.push_back(pose);
+      distinct.push_back(all[i]);
+    }
+    all = std::move(distinct);
   };
   std::vector<Hypothesis> hypotheses;
-  for (const Eigen::Vector3d& place : places) {
+  for (std::size_t index = 0; index < places.size(); ++index) {
+    const Eigen::Vector3d& place = places[index];
     hypotheses.clear();
     for (const double stretch : {0.93, 1.0, 1.07}) {
       // Orientations are laid out as seen along the ray to the place.
@@ -211,11 +230,11 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
         Pose pose = Pose::Identity();
         pose.translation() = place * stretch;
         pose.linear() = facing * orientation;
-        hypotheses.push_back({toParticlePose(pose), 0});
+        hypotheses.push_back({toParticlePose(pose), 0, index});
       }
     }
-    scoreAll(hypotheses, mapsFor(place.z()));
-    keepBest(hypotheses, 32);
+    scoreAll(hypotheses, kCoarsePoints, mapsFor(place.z()));
+    keepDistinct(hypotheses, index < kLikelyPlaces ? kKeptAtLikely : kKeptElsewhere, 0.2);
     kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
   }
   if (near) {
@@ -228,22 +247,22 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       for (int k = 0; k < 6; ++k)
         step[k] = reach * (k < 3 ? 0.01 : 0.12) *
                   static_cast<double>(normals[static_cast<std::size_t>(k)]);
-      hypotheses.push_back({toParticlePose(movedInCamera(*near, step)), 0});
+      hypotheses.push_back({toParticlePose(movedInCamera(*near, step)), 0, places.size()});
     }
-    scoreAll(hypotheses, mapsFor(std::max(0.03, near->translation().z())));
-    keepBest(hypotheses, 32);
+    scoreAll(hypotheses, kCoarsePoints, mapsFor(std::max(0.03, near->translation().z())));
+    keepDistinct(hypotheses, kKeptAtLikely, 0.1);
     kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
   }
   if (kept.empty()) return std::nullopt;
-  keepBest(kept, kKept);
 
   // Each of the kept moves to the best of its children, in steps that shrink.
   for (int round = 0; round < kRounds; ++round) {
-    const double size = std::pow(0.55, round);
+    const double size = std::pow(0.6, round);
     tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t i) {
       const Pose parent = toPose(kept[i].pose);
       const double depth = std::max(0.03, parent.translation().z());
       std::vector<Hypothesis> children{kept[i]};
+      children.front().score = 0;
       for (int child = 0; child < kChildren; ++child) {
         CounterRandom random(params_.filter.seed + calls_, static_cast<std::uint64_t>(round) + 100,
                              i * kChildren + static_cast<std::uint64_t>(child));
@@ -255,25 +274,24 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
         // Along the ray the place is less well known.
         step.head<3>() += parent.translation().normalized() * (size * 0.03 * depth *
                                                                static_cast<double>(normals[2]));
-        children.push_back({toParticlePose(movedInCamera(parent, step)), 0});
+        children.push_back({toParticlePose(movedInCamera(parent, step)), 0, kept[i].place});
       }
-      scoreAll(children, mapsFor(depth));
+      scoreAll(children, model_->points(), mapsFor(depth, round));
       kept[i] = *std::max_element(
           children.begin(), children.end(),
           [](const Hypothesis& a, const Hypothesis& b) { return a.score < b.score; });
     });
   }
-  keepBest(kept, kept.size());
-
+  // Scores of different places do not compare: large projections collect more of everything.
   std::vector<Pose> starts;
-  for (const Hypothesis& hypothesis : kept) {
-    const Pose pose = toPose(hypothesis.pose);
-    const bool known = std::any_of(starts.begin(), starts.end(), [&](const Pose& other) {
-      return (pose.translation() - other.translation()).norm() < 0.25 * model_->radius() &&
-             angleBetween(pose.linear(), other.linear(), symmetry_) < 0.2;
-    });
-    if (!known) starts.push_back(pose);
-    if (starts.size() >= kRefined) break;
+  for (std::size_t first = 0; first < kept.size();) {
+    std::size_t last = first;
+    while (last < kept.size() && kept[last].place == kept[first].place) ++last;
+    std::vector<Hypothesis> here(kept.begin() + static_cast<std::ptrdiff_t>(first),
+                                 kept.begin() + static_cast<std::ptrdiff_t>(last));
+    keepDistinct(here, here.size() > kKeptElsewhere ? kRefinedAtLikely : kRefinedElsewhere, 0.15);
+    for (const Hypothesis& hypothesis : here) starts.push_back(toPose(hypothesis.pose));
+    first = last;
   }
   std::vector<RefinedPose> refined(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {

@@ -24,9 +24,11 @@ struct EyeView {
 /// 1 cm to the eye, or outside the image, add nothing; a pose inside the body scores zero.
 ///
 /// The instruction set is chosen at run time.
-void scoreContours(const ContourModel& model, const EyeView* eyes, std::size_t eye_count,
-                   float independent_share, const ParticlePose* poses, std::size_t count,
-                   float* log_likelihood);
+/// @param points of each view that are scored, a multiple of 16: less than all are an even sample,
+/// and the sum is that of the sample
+void scoreContours(const ContourModel& model, int points, const EyeView* eyes,
+                   std::size_t eye_count, float independent_share, const ParticlePose* poses,
+                   std::size_t count, float* log_likelihood);
 
 /// Names of the instruction sets that this machine can run, best first.
 std::vector<std::string> contourKernelTargets();

@@ -24,7 +24,8 @@ struct ContourPoint {
 /// What of the contour one view shows, hidden lines left out.
 struct ContourView {
   /// Points for scoring, one array a coordinate: x y z [m] and the tangent times the length [m].
-  /// Each array has ContourModel::points() entries (a multiple of 16, padded with zero tangents).
+  /// Each array has ContourModel::points() entries (a multiple of 16, padded with zero tangents),
+  /// in such an order that the first 16, 32 ... are an even sample of all.
   std::vector<float> arrays;
   /// Points for refinement, about twice as dense.
   std::vector<ContourPoint> points;

@@ -39,6 +39,7 @@ class PoseSearch {
   struct Hypothesis {
     ParticlePose pose;
     float score = 0;
+    std::size_t place = 0;
   };
   struct Blob {
     double u = 0, v = 0, area = 0, width = 0, height = 0;
@@ -47,8 +48,9 @@ class PoseSearch {
 
   std::vector<Blob> findBlobs(const cv::Mat& image) const;
   std::vector<Eigen::Vector3d> findPlaces(const RectifiedStereoFrame& frame) const;
-  void scoreAll(std::vector<Hypothesis>& hypotheses, const std::array<GainMap, 2>& maps) const;
-  const std::array<GainMap, 2>& mapsFor(double depth) const;
+  void scoreAll(std::vector<Hypothesis>& hypotheses, int points,
+                const std::array<GainMap, 2>& maps) const;
+  const std::array<GainMap, 2>& mapsFor(double depth, int sharpening = 0) const;
 
   TrackerParams params_;
   RectifiedStereoCamera camera_;
@@ -58,7 +60,7 @@ class PoseSearch {
   Symmetry symmetry_;
   std::vector<Eigen::Matrix3d> orientations_;
   std::array<EdgeField, 2> fields_;
-  std::array<std::array<GainMap, 2>, 3> maps_;  ///< by cell size 2, 4, 8 px; by eye
+  std::array<std::array<GainMap, 2>, 4> maps_;  ///< by cell size 1, 2, 4, 8 px; by eye
   std::uint64_t calls_ = 0;
 };
 
