@@ -25,16 +25,16 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-/// Places of views in radii of the mesh. Between neighbours the part of a sphere that is seen changes
-/// by 7 to 14 deg, about as much as between neighbouring directions.
+/// Places of views in radii of the mesh. Between neighbours the part of a sphere that is seen
+/// changes by 7 to 14 deg, about as much as between neighbouring directions.
 constexpr std::array<double, 6> kDistances{0.6, 0.85, 1.2, 1.6, 2.3, 5.0};
 constexpr double kNearestEver = 0.5;  ///< [radii]
 constexpr double kClearance = 1.03;   ///< no eye is nearer to the convex hull, in hull distances
 
-constexpr double kSharp = 30 * M_PI / 180;    ///< [rad] between normals; more is a crease
-constexpr double kFlat = 0.05 * M_PI / 180;   ///< [rad] less is no edge at all
-constexpr double kPieceAngle = 1.5 / 120;     ///< length of a piece [radii], seen across
-constexpr double kOffSurface = 1e-4;          ///< where rays start [radii], to miss their own surface
+constexpr double kSharp = 30 * M_PI / 180;   ///< [rad] between normals; more is a crease
+constexpr double kFlat = 0.05 * M_PI / 180;  ///< [rad] less is no edge at all
+constexpr double kPieceAngle = 1.5 / 120;    ///< length of a piece [radii], seen across
+constexpr double kOffSurface = 1e-4;  ///< where rays start [radii], to miss their own surface
 
 /// Vertices of an icosahedron whose triangles are split in four, three times: 642 directions, about
 /// 8 deg apart.
@@ -181,9 +181,7 @@ class SightLines {
       Eigen::Index axis = 0;
       (most - least).maxCoeff(&axis);
       const std::size_t middle = (begin + end) / 2;
-      const auto at = [&](std::size_t i) {
-        return order.begin() + static_cast<std::ptrdiff_t>(i);
-      };
+      const auto at = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
       std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
         return centers[a][axis] != centers[b][axis] ? centers[a][axis] < centers[b][axis] : a < b;
       });
@@ -236,7 +234,8 @@ Mesh withoutRepeatedTriangles(const Mesh& mesh) {
   return clean;
 }
 
-/// Finds the visible contour from any place. Nothing depends on which way round triangles are given.
+/// Finds the visible contour from any place. Nothing depends on which way round triangles are
+/// given.
 class ContourFinder {
  public:
   explicit ContourFinder(const Mesh& mesh)
@@ -380,7 +379,8 @@ class ContourFinder {
     }
   }
 
-  /// Unit vector from the edge into the open: across the image for outlines, else between the faces.
+  /// Unit vector from the edge into the open: across the image for outlines, else between the
+  /// faces.
   Vector3d freeSide(const Edge& edge, bool outline, const Vector3d& ray) const {
     if (outline) return awayInImage(edge, ray);
     Vector3d sum = Vector3d::Zero();
@@ -400,8 +400,8 @@ class ContourFinder {
   Vector3d awayFromFace(const Edge& edge, const Vector3d& ray) const {
     // The face that is seen lies between the eye and the other one.
     const Vector3d& normal = normals_[edge.triangles[0]];
-    const bool first = edge.kind == Kind::kOpen ||
-                       normal.dot(ray) * normal.dot(edge.apexes[1] - edge.start) <= 0;
+    const bool first =
+        edge.kind == Kind::kOpen || normal.dot(ray) * normal.dot(edge.apexes[1] - edge.start) <= 0;
     const Vector3d along = (edge.end - edge.start).normalized();
     const Vector3d inwards = edge.apexes[first ? 0 : 1] - edge.start;
     return (along * along.dot(inwards) - inwards).normalized();
