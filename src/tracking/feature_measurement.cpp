@@ -13,6 +13,8 @@ constexpr double kRange = 0.03;         // [m] over which a point of something e
 constexpr double kNearestDepth = 0.02;  // [m]
 constexpr double kLeastReach = 0.003;   // [m] in which the landmark of a feature is looked for
 constexpr double kLocateTolerance = 0.002;  // [m]
+constexpr int kIterations = 10;             // of Gauss-Newton, at most
+constexpr double kStill = 1e-5;             // [m] a smaller step is the last
 constexpr double kTrusted = 0.5;            // probability that a feature belongs to the object
 
 /// log(1 + exp(x)) without overflow.
@@ -104,7 +106,7 @@ float FeatureMeasurement::scoreOne(const ParticlePose& pose) const {
     }
     sum += softplus(point.peak - 0.5F * square);
   }
-  return sum;
+  return static_cast<float>(params_.independent_share) * sum;
 }
 
 FeatureSupport FeatureMeasurement::support(const Pose& camera_from_object) const {
@@ -138,7 +140,25 @@ FeatureSupport FeatureMeasurement::support(const Pose& camera_from_object) const
       sums.surface_points += belongs;
     }
   }
+  sums.information *= params_.independent_share;
+  sums.gradient *= params_.independent_share;
+  sums.log_likelihood *= params_.independent_share;
   return sums;
+}
+
+PosePrior FeatureMeasurement::refine(const PosePrior& prior) const {
+  PosePrior posterior = prior;
+  for (int i = 0; i < kIterations; ++i) {
+    const FeatureSupport sums = support(posterior.mean);
+    const Twist from_prior = cameraTwistBetween(prior.mean, posterior.mean);
+    posterior.information = prior.information + sums.information;
+    const Twist step =
+        posterior.information.ldlt().solve(Twist(sums.gradient - prior.information * from_prior));
+    if (!step.allFinite()) return prior;
+    posterior.mean = normalized(movedInCamera(posterior.mean, step));
+    if (step.head<3>().norm() < kStill && step.tail<3>().norm() < kStill / radius_) break;
+  }
+  return posterior;
 }
 
 void FeatureMeasurement::learn(const Pose& camera_from_object, double position_sigma,

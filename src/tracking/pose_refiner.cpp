@@ -80,11 +80,37 @@ struct PoseRefiner::Match {
   double samples = 0;   ///< independent ones that the point stands for
   double length = 0;    ///< [px]
   Eigen::Vector2f place, normal;  ///< [px], unit vector in the image
+  float clearance = 0;    ///< [px] to the next line of the contour beside this one
   int eye = 0;
   bool found = false;
   bool outline = false;
   bool bright_inside = false;
 };
+
+/// How far another line of the contour runs beside each: an edge between the two belongs to the
+/// nearer. Looks at the matches from `first` on.
+void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches) {
+  thread_local std::vector<std::array<float, 4>> lines;
+  lines.clear();
+  for (std::size_t j = first; j < matches.size(); j += 2)
+    lines.push_back({matches[j].place.x(), matches[j].place.y(), matches[j].normal.x(),
+                     matches[j].normal.y()});
+  for (std::size_t i = first; i < matches.size(); i += 2) {
+    const float u = matches[i].place.x(), v = matches[i].place.y();
+    const float nu = matches[i].normal.x(), nv = matches[i].normal.y();
+    float clearance = kClearance;
+    for (const auto& line : lines) {
+      const float du = line[0] - u, dv = line[1] - v;
+      const float across = std::abs(nu * du + nv * dv);
+      const bool beside = (across > 0.7F) & (std::abs(nu * dv - nv * du) < kAlongside) &
+                          (std::abs(nu * line[2] + nv * line[3]) > 0.8F);
+      clearance = beside && across < clearance ? across : clearance;
+    }
+    matches[i].clearance = clearance;
+    // Neighbours along the contour share it.
+    if (i + 1 < matches.size()) matches[i + 1].clearance = clearance;
+  }
+}
 
 PoseRefiner::PoseRefiner(const ContourParams& params, const RectifiedStereoCamera& camera)
     : params_(params), camera_(camera) {}
@@ -149,20 +175,12 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       matches.push_back(match);
     }
 
+    findClearances(first, matches);
     for (std::size_t i = first; i < matches.size(); ++i) {
       Match& match = matches[i];
       const float fu = match.place.x(), fv = match.place.y();
       const float nu = match.normal.x(), nv = match.normal.y();
-      // Another line of the contour that runs beside this one: an edge between the two belongs to
-      // the nearer.
-      float clearance = kClearance;
-      for (std::size_t j = first; j < matches.size(); ++j) {
-        const float du = matches[j].place.x() - fu, dv = matches[j].place.y() - fv;
-        const float across = std::abs(nu * du + nv * dv);
-        if (across > 0.7F && across < clearance && std::abs(nu * dv - nv * du) < kAlongside &&
-            std::abs(match.normal.dot(matches[j].normal)) > 0.8F)
-          clearance = across;
-      }
+      const float clearance = match.clearance;
       const double own_range = std::min(range, std::max(0.75, 0.5 * clearance));
       const int reach = std::min(kLongestRange, static_cast<int>(std::ceil(own_range)));
 

@@ -1,5 +1,6 @@
 #include "leap_object_tracker/tracking/tracker.hpp"
 
+#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -248,21 +249,36 @@ class Tracker::Impl {
       if (i == 0 || !near) starts.push_back(pose);
     }
 
-    RefinedPose best;
-    double best_score = -1e18;
-    for (std::size_t i = 0; i < starts.size(); ++i) {
-      const std::vector<double> ranges =
-          i == 0 && !fresh_ ? std::vector<double>{6, 4, 2.5} : std::vector<double>{8, 5, 3, 2.5};
-      const RefinedPose refined = refiner_.refine(model_, measurement_.fields(), starts[i], prior,
-                                                  bright_inside_, ranges);
-      const Twist shift = cameraTwistBetween(belief_.pose, refined.camera_from_object);
-      const double score =
-          refined.log_likelihood - 0.5 * shift.dot(prior_information * shift);
-      if (score > best_score) {
-        best_score = score;
-        best = refined;
-      }
-    }
+    // The prediction first; particles that would only lead to the same place are left out.
+    std::vector<RefinedPose> refined(starts.size());
+    const auto refine = [&](std::size_t i) {
+      refined[i] = refiner_.refine(
+          model_, measurement_.fields(), starts[i], prior, bright_inside_,
+          i == 0 && !fresh_ ? std::vector<double>{6, 4, 2.5} : std::vector<double>{8, 5, 3, 2.5});
+    };
+    refine(0);
+    const Pose& first = refined[0].camera_from_object;
+    const double depth = std::max(0.03, first.translation().z());
+    const double same = 2.5 / (camera_.focal_length / depth);  // [m] that 2.5 px stand for
+    starts.erase(std::remove_if(starts.begin() + 1, starts.end(),
+                                [&](const Pose& start) {
+                                  return (start.translation() - first.translation()).norm() <
+                                             std::max(2 * same, 0.1 * model_.radius()) &&
+                                         angleBetween(start.linear(), first.linear(),
+                                                      object_.symmetry) <
+                                             2 * same / model_.radius();
+                                }),
+                 starts.end());
+    refined.resize(starts.size());
+    tbb::parallel_for(std::size_t{1}, starts.size(), refine);
+
+    const auto score = [&](const RefinedPose& candidate) {
+      const Twist shift = cameraTwistBetween(belief_.pose, candidate.camera_from_object);
+      return candidate.log_likelihood - 0.5 * shift.dot(prior_information * shift);
+    };
+    RefinedPose best = refined[0];
+    for (const RefinedPose& candidate : refined)
+      if (score(candidate) > score(best)) best = candidate;
     return best;
   }
 

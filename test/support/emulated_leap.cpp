@@ -138,8 +138,10 @@ int EmulatedLeap::control(const Setup& setup, std::uint8_t* data) {
           default:
             return -EPIPE;
         }
-      case 0x01:  // CLEAR_FEATURE, SET_CONFIGURATION
-      case 0x09:
+      case 0x01:  // CLEAR_FEATURE, of an endpoint: the halt
+        if ((setup.type & 0x1f) == 2) halted_ = false;
+        return 0;
+      case 0x09:  // SET_CONFIGURATION
         return 0;
       case 0x0b:  // SET_INTERFACE
         stop();

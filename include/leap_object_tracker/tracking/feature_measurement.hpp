@@ -11,6 +11,7 @@
 #include "leap_object_tracker/tracking/feature_landmarks.hpp"
 #include "leap_object_tracker/tracking/feature_params.hpp"
 #include "leap_object_tracker/tracking/measurement_model.hpp"
+#include "leap_object_tracker/tracking/pose_refiner.hpp"
 
 namespace leap_object_tracker {
 
@@ -44,6 +45,10 @@ class FeatureMeasurement {
 
   /// The same of one pose, with the Gauss-Newton step towards a better one.
   FeatureSupport support(const Pose& camera_from_object) const;
+
+  /// The pose that explains features and prior best (Gauss-Newton), and what both together know of
+  /// it: a prior for the contour (PoseRefiner), or the posterior of features alone.
+  PosePrior refine(const PosePrior& prior) const;
 
   /// Sticks the features of the last frame to the object. Only for a pose to stand by.
   /// @param position_sigma [m], rotation_sigma [rad] how well the pose is known

@@ -13,7 +13,9 @@ struct FeatureParams {
   double corner_sigma = 0.4;       ///< [px] how well a corner is found at the same place again
   double model_sigma = 0.0003;     ///< [m] how far the body may differ from its model
   double outlier_share = 0.3;      ///< prior share of points that are not of the object
-  int landmarks = 400;             ///< most landmarks kept of an object
+  double independent_share =
+      0.3;              ///< of the points; errors of neighbours and of one pose are alike
+  int landmarks = 400;  ///< most landmarks kept of an object
 };
 
 }  // namespace leap_object_tracker

@@ -57,6 +57,7 @@ class PoseRefiner {
 
  private:
   struct Match;
+  static void findClearances(std::size_t first, std::vector<Match>& matches);
   void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
              double range, double bright_inside, std::vector<Match>& matches,
              std::array<EyeSupport, 2>& eyes) const;
