@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "leap_object_tracker/evaluation/trajectory_error.hpp"
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
@@ -47,7 +48,9 @@ struct Tracked {
   ObjectModel object;
 };
 
-Tracked track(const Expected& expected, int threads) {
+/// @param most_frames the rest of the bag is left out
+Tracked track(const Expected& expected, int threads,
+              std::size_t most_frames = std::numeric_limits<std::size_t>::max()) {
   const std::string root = LEAP_SOURCE_FOLDER "/";
   const std::string config = root + "config/" + expected.config;
   ParameterReader reader(loadYamlFile(config), config);
@@ -64,6 +67,7 @@ Tracked track(const Expected& expected, int threads) {
   else
     tracker.search();
   bag.forEachPair([&](const RawStereoFrame& raw) {
+    if (run.frames.size() == most_frames) return;
     run.frames.push_back(raw.stamp);
     const auto estimate = tracker.track(rectifier.rectify(raw));
     if (estimate)
@@ -94,7 +98,8 @@ TEST_P(Bags, areTrackedWithinTheirBounds) {
 }
 
 TEST_P(Bags, giveTheSamePosesWhateverTheNumberOfThreads) {
-  const Tracked one = track(GetParam(), 1), three = track(GetParam(), 3);
+  const Tracked one = track(GetParam(), 1, 15), three = track(GetParam(), 3, 15);
+  ASSERT_GT(one.poses.size(), 10u);
   ASSERT_EQ(one.poses.size(), three.poses.size());
   for (std::size_t i = 0; i < one.poses.size(); ++i)
     EXPECT_EQ(one.poses[i].camera_from_object.matrix(), three.poses[i].camera_from_object.matrix());
