@@ -95,6 +95,10 @@ void EmulatedLeap::setRate(double share) {
   const std::lock_guard<std::mutex> lock(mutex_);
   rate_ = share;
 }
+bool EmulatedLeap::hasRate() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return rate_ > 0;
+}
 void EmulatedLeap::setFourByteControls(bool only) {
   const std::lock_guard<std::mutex> lock(mutex_);
   four_byte_controls_ = only;
@@ -427,12 +431,15 @@ EmulatedLeap::Clock::time_point EmulatedLeap::produce(Clock::time_point now, boo
     if (sent_ == raster_.size()) {
       const auto start = frame_start_ + period;
       if (now < start) return start;
-      beginFrame(start);
+      // Pictures that take long to render make a slow device, not one that hurries later.
+      beginFrame(now - start > period ? now : start);
     }
     const auto due =
         frame_start_ + std::chrono::duration_cast<Clock::duration>(
                            period * (kReadOutShare * (payload_number_ + 1) / payloads));
     if (now < due) return due;
+    // While the host waits, nothing is lost: if the emulation is late, that is not the host's fault.
+    if (host_waits && buffer_.size() >= kDeviceBuffer) return now;
     makePayload();
     if (halted_) return now + kIdle;
   }

@@ -78,6 +78,7 @@ class EmulatedLeap {
   void setControlBehaviour(ControlBehaviour behaviour);
   /// Real rate as a share of the nominal one; 0: as fast as the host asks.
   void setRate(double share);
+  bool hasRate() const;
   void setFourByteControls(bool only);
   /// As firmware that stops by itself.
   void stopStreaming();

@@ -43,6 +43,7 @@ EmulatedUsbfs::EmulatedUsbfs(EmulatedLeap& leap, std::function<void(bool)> reada
     : leap_(leap), readable_(std::move(readable)) {
   thread_ = std::thread([this] { serve(); });
   pthread_setname_np(thread_.native_handle(), "emulated_leap");
+  if (!leap.hasRate()) return;
   // Hardware does not wait for the computer; only with rights.
   sched_param priority{};
   priority.sched_priority = 20;

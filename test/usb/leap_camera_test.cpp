@@ -139,6 +139,8 @@ TEST_F(LeapCameraTest, findsItsOwnDeviceAmongTwoInAnyOrder) {
 }
 
 TEST_F(LeapCameraTest, twoCamerasShareTheBus) {
+  leap_.setRate(0.3);
+  other_.setRate(0.3);
   other_.setSerial("LP22222222222");
   bus_.port(2).plug(other_);
   port().plug(leap_);

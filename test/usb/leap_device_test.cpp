@@ -118,6 +118,7 @@ TEST_P(EveryMode, streamsEachBitAsSent) {
   }
   EXPECT_EQ(0u, device->counters().frames.torn);
   EXPECT_EQ(0u, device->counters().missing);
+  EXPECT_EQ(0u, device->counters().dropped);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, EveryMode,
