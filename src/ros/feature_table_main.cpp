@@ -10,6 +10,7 @@
 #include "leap_object_tracker/evaluation/trajectory_error.hpp"
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
 #include "leap_object_tracker/tracking/feature_measurement.hpp"
+#include "object_region.hpp"
 #include "stereo_bag.hpp"
 
 namespace leap_object_tracker {
@@ -37,31 +38,6 @@ struct Count {
   double corners = 0, matches = 0, features = 0, on_object = 0, milliseconds = 0;
 };
 
-/// The part of each eye that shows the object.
-std::array<cv::Rect, 2> regionsOf(const ObjectModel& object, const Pose& camera_from_object,
-                                  const RectifiedStereoCamera& camera) {
-  std::array<cv::Rect, 2> regions;
-  for (std::size_t eye = 0; eye < 2; ++eye) {
-    std::vector<cv::Point2f> pixels;
-    for (const auto& vertex : object.mesh.vertices) {
-      const Eigen::Vector3d point = camera_from_object * vertex;
-      if (point.z() < 0.01) continue;
-      const Eigen::Vector2d pixel = eye == 0 ? camera.leftPixel(point) : camera.rightPixel(point);
-      pixels.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
-    }
-    if (pixels.empty()) continue;
-    const auto [left, right] = std::minmax_element(
-        pixels.begin(), pixels.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
-    const auto [top, bottom] = std::minmax_element(
-        pixels.begin(), pixels.end(), [](const auto& a, const auto& b) { return a.y < b.y; });
-    const cv::Point first(static_cast<int>(left->x) - kMargin, static_cast<int>(top->y) - kMargin);
-    const cv::Point last(static_cast<int>(right->x) + kMargin,
-                         static_cast<int>(bottom->y) + kMargin);
-    regions[eye] = cv::Rect(first, last) & cv::Rect(cv::Point(), camera.size);
-  }
-  return regions;
-}
-
 class DetectorCounter {
  public:
   DetectorCounter(const ObjectModel& object, const RectifiedStereoCamera& camera,
@@ -73,7 +49,7 @@ class DetectorCounter {
 
   Count count(const RectifiedStereoFrame& frame, const Pose& camera_from_object) {
     FeatureWindow window;
-    window.regions = regionsOf(object_, camera_from_object, camera_);
+    window.regions = objectRegions(object_.mesh, camera_from_object, camera_, kMargin);
     const double reach = radiusOf(object_.mesh) + kReach;
     window.nearest = std::max(0.02, camera_from_object.translation().z() - reach);
     window.farthest = camera_from_object.translation().z() + reach;
