@@ -123,14 +123,15 @@ class SightLines {
   bool blocked(const Vector3f& from, const Vector3f& to) const {
     if (nodes_.empty()) return false;
     const Vector3f way = to - from;
-    const Eigen::Array3f inverse = way.array().inverse();
+    const Eigen::Array4f start(from.x(), from.y(), from.z(), 0);
+    const Eigen::Array4f inverse(1 / way.x(), 1 / way.y(), 1 / way.z(), 1);
     std::array<std::uint32_t, 64> waiting;
     std::size_t count = 0;
     waiting[count++] = 0;
     while (count > 0) {
       const std::uint32_t index = waiting[--count];
       const Node& node = nodes_[index];
-      if (!crosses(node, from, inverse)) continue;
+      if (!crosses(node, start, inverse)) continue;
       if (node.triangles > 0) {
         for (std::uint32_t i = node.next; i < node.next + node.triangles; ++i)
           if (hits(triangles_[i], from, way)) return true;
@@ -147,7 +148,7 @@ class SightLines {
     Vector3f corner, first, second;
   };
   struct Node {
-    Eigen::Array3f low, high;
+    Eigen::Array4f low, high;     ///< the fourth entry is any wide span, to fill a register
     std::uint32_t next = 0;       ///< first triangle of a leaf, else the second child
     std::uint32_t triangles = 0;  ///< zero: the first child is the node behind this one
   };
@@ -157,23 +158,22 @@ class SightLines {
     const std::size_t index = nodes_.size();
     nodes_.emplace_back();
     Node node;
-    node.low.setConstant(std::numeric_limits<float>::max());
-    node.high = -node.low;
-    Eigen::Array3f least = node.low, most = node.high;
+    Eigen::Array3f low = Eigen::Array3f::Constant(std::numeric_limits<float>::max());
+    Eigen::Array3f high = -low, least = low, most = high;
     for (std::size_t i = begin; i < end; ++i) {
       const Triangle& t = triangles_[order[i]];
       const Vector3f second = t.corner + t.first, third = t.corner + t.second;
       for (const Vector3f& corner : {t.corner, second, third}) {
-        node.low = node.low.min(corner.array());
-        node.high = node.high.max(corner.array());
+        low = low.min(corner.array());
+        high = high.max(corner.array());
       }
       least = least.min(centers[order[i]].array());
       most = most.max(centers[order[i]].array());
     }
     // Flat boxes would miss rays in their plane by rounding.
-    const float margin = 1e-6F * (node.high.abs().max(node.low.abs())).maxCoeff();
-    node.low -= margin;
-    node.high += margin;
+    const float margin = 1e-6F * low.abs().max(high.abs()).maxCoeff();
+    node.low = {low.x() - margin, low.y() - margin, low.z() - margin, -1};
+    node.high = {high.x() + margin, high.y() + margin, high.z() + margin, 1};
     if (end - begin <= 4) {
       node.next = static_cast<std::uint32_t>(begin);
       node.triangles = static_cast<std::uint32_t>(end - begin);
@@ -192,9 +192,9 @@ class SightLines {
     nodes_[index] = node;
   }
 
-  static bool crosses(const Node& node, const Vector3f& from, const Eigen::Array3f& inverse) {
-    const Eigen::Array3f a = (node.low - from.array()) * inverse;
-    const Eigen::Array3f b = (node.high - from.array()) * inverse;
+  static bool crosses(const Node& node, const Eigen::Array4f& from, const Eigen::Array4f& inverse) {
+    const Eigen::Array4f a = (node.low - from) * inverse;
+    const Eigen::Array4f b = (node.high - from) * inverse;
     return std::max(a.min(b).maxCoeff(), 0.0F) <= std::min(a.max(b).minCoeff(), 1.0F);
   }
 
@@ -524,9 +524,8 @@ class ViewFile {
   }
 
  private:
-  static constexpr std::uint64_t kVersion = 2;  ///< of the format and of how views are found
-  static constexpr std::size_t kPointBytes = 44;
-  static_assert(sizeof(ContourPoint) == kPointBytes, "written as bytes");
+  static constexpr std::uint64_t kVersion = 3;  ///< of the format and of how views are found
+  static_assert(sizeof(ContourPoint) == 11 * sizeof(float), "written as bytes, without gaps");
 
   template <class T>
   static void put(const T* values, std::size_t count, std::vector<char>& bytes) {
