@@ -17,6 +17,7 @@ namespace {
 constexpr char kAttach[] = "/sys/devices/platform/vhci_hcd.0/attach";
 constexpr unsigned kDevice = 0x10002;  // bus 1, address 2 on the far side
 constexpr int kHighSpeed = 3;          // enum usb_device_speed
+constexpr int kAttempts = 100;
 constexpr std::size_t kHeaderBytes = 48;
 constexpr std::size_t kPacket = 512;
 constexpr std::uint32_t kSubmit = 1, kUnlink = 2, kSubmitReply = 3, kUnlinkReply = 4;
@@ -53,13 +54,22 @@ void EmulatedVhci::plug(EmulatedLeap& leap) {
   char line[64];
   const int length =
       std::snprintf(line, sizeof line, "%d %d %u %d", 0, ends[1], kDevice, kHighSpeed);
-  const int file = open(kAttach, O_WRONLY);
-  const bool taken = file >= 0 && write(file, line, static_cast<std::size_t>(length)) == length;
-  if (file >= 0) close(file);
+  // The kernel needs a while to let go of the device that was in this port before.
+  bool taken = false;
+  for (int attempt = 0; attempt < kAttempts && !taken; ++attempt) {
+    if (attempt > 0) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    const int file = open(kAttach, O_WRONLY);
+    taken = file >= 0 && write(file, line, static_cast<std::size_t>(length)) == length;
+    const int error = errno;
+    if (file >= 0) close(file);
+    errno = error;
+    if (!taken && error != EBUSY) break;
+  }
+  const int error = errno;
   close(ends[1]);
   if (!taken) {
     close(ends[0]);
-    throw std::runtime_error(std::string(kAttach) + ": " + std::strerror(errno));
+    throw std::runtime_error(std::string(kAttach) + ": " + std::strerror(error));
   }
   socket_ = ends[0];
   stop_ = false;
