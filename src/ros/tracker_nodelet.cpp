@@ -78,9 +78,8 @@ class TrackerNodelet : public nodelet::Nodelet {
     const auto begin = ros::WallTime::now();
     try {
       followCamera(pair);
-      const RectifiedStereoFrame frame{stampFrom(pair.header().stamp),
-                                       pair.left ? imageFrom(*pair.left) : cv::Mat(),
-                                       pair.right ? imageFrom(*pair.right) : cv::Mat()};
+      const RectifiedStereoFrame frame{stampFrom(pair.header().stamp), pictureOf(pair.left),
+                                       pictureOf(pair.right)};
       followTime(pair.header().stamp);
       const auto estimate = tracker_->track(frame, fixedFromCamera(pair.header()));
       if (estimate) {
@@ -108,6 +107,15 @@ class TrackerNodelet : public nodelet::Nodelet {
     tracker_ = std::make_unique<Tracker>(params_.tracker, object_, camera);
     NODELET_INFO_STREAM("tracks '" << object_.name << "' in images of " << camera.size);
     carryOut(order);
+  }
+
+  /// The pixels of an eye; none of an eye that is not there.
+  cv::Mat pictureOf(const sensor_msgs::ImageConstPtr& message) const {
+    if (!message) return {};
+    const cv::Mat picture = imageFrom(*message);
+    if (picture.size() != tracker_->camera().size)
+      throw std::invalid_argument("image: its size is not that of its camera_info");
+    return picture;
   }
 
   void followTime(const ros::Time& stamp) {

@@ -14,6 +14,7 @@
 #include "support/nodelet_chain.hpp"
 #include "support/program_run.hpp"
 #include "support/stereo_camera_player.hpp"
+#include "support/stereo_messages.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace leap_object_tracker {
@@ -184,6 +185,31 @@ TEST_F(TrackerNodelet, saysWhatIsWrongWithItsObjectAndStaysQuiet) {
   load("/leap/tracker", "TrackerNodelet");
   EXPECT_TRUE(eventually([&] { return log.holds("/nowhere.yaml"); }));
   EXPECT_FALSE(poses_.connected());
+}
+
+TEST_F(TrackerNodelet, takesTheCameraToBeAtRestWhenNobodyKnowsItsMotion) {
+  const LogRecorder log;
+  ros::param::set("/leap/tracker/fixed_frame", std::string("nowhere"));
+  start(textFrom(firstTruth()));
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(play(pairs_[static_cast<std::size_t>(i)]));
+  EXPECT_EQ(state(), TrackerStatus::TRACKING);
+  EXPECT_TRUE(eventually([&] { return log.holds("taken to be at rest"); }));
+}
+
+TEST_F(TrackerNodelet, leavesOutPairsThatAreNotOfTheSizeOfTheirCamera) {
+  const LogRecorder log;
+  StereoCameraPlayer rectified(nh_, "image_rect", "/leap/rect/");
+  ros::param::set("/leap/tracker/object", std::string(kObject));
+  ASSERT_TRUE(load("/leap/tracker", "TrackerNodelet"));
+  ASSERT_TRUE(eventually([&] { return rectified.heard(); }));
+  StereoMessages pair;
+  const ros::Time time(5);
+  pair.left = boost::make_shared<sensor_msgs::Image>(grayImage(32, 48, 50, time));
+  pair.right = boost::make_shared<sensor_msgs::Image>(grayImage(32, 48, 50, time));
+  pair.left_info = boost::make_shared<sensor_msgs::CameraInfo>(smallCamera(false, time));
+  pair.right_info = boost::make_shared<sensor_msgs::CameraInfo>(smallCamera(true, time));
+  rectified.publish(pair);
+  EXPECT_TRUE(eventually([&] { return log.holds("size is not that of its camera_info"); }));
 }
 
 TEST_F(TrackerNodelet, dropsPairsThatWaitBehindANewerOne) {
