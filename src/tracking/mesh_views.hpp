@@ -17,7 +17,7 @@ struct MeshViews {
 };
 
 /// Finds outlines, self-occlusions and creases sharper than 30 deg that are visible from each place,
-/// with a depth buffer. Uses all cores.
+/// by casting rays. Uses all cores.
 /// @param cache_folder where the result is kept, named by its content; empty: nowhere. A folder that
 /// cannot be written to, or a damaged file in it, is ignored.
 MeshViews makeMeshViews(const Mesh& mesh, int points, const std::string& cache_folder);

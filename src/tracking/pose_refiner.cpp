@@ -12,6 +12,10 @@ constexpr double kSupportDistance = 1.5;  // [px]
 constexpr int kLongestRange = 24;         // [px]
 constexpr float kClearance = 16;          // [px] lines farther apart do not disturb each other
 constexpr float kAlongside = 4;           // [px]
+// [px] by how much the rounding and the gloss of an edge between two visible faces may move its image.
+constexpr double kCreaseDoubt = 1.2;
+// Edges along one line share their errors: this share of the information of independent ones is left.
+constexpr double kIndependentErrors = 0.4;
 
 /// Grey values of a field at sub-pixel places of the whole image.
 class Sampler {
@@ -224,7 +228,8 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           match.offset = place;
           match.bright_inside = brighter_inside;
           match.variance = params_.edge_sigma * params_.edge_sigma +
-                           std::pow(weakest / size, 2) + std::pow(crowding, 2);
+                           std::pow(weakest / size, 2) + std::pow(crowding, 2) +
+                           (match.outline ? 0.0 : kCreaseDoubt * kCreaseDoubt);
         }
         if (match.found) {
           // The edge must run along the contour: its slope lies across.
@@ -304,7 +309,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     if (m.found) {
       const double weight = tukeyWeight(m.offset, 4.685 * std::max(deviation, params_.edge_sigma));
       result.information.noalias() +=
-          weight * m.samples / m.variance * m.jacobian * m.jacobian.transpose();
+          kIndependentErrors * weight * m.samples / m.variance * m.jacobian * m.jacobian.transpose();
       if (m.outline && std::abs(m.offset) < kSupportDistance) {
         judged += m.length;
         if (m.bright_inside) bright += m.length;

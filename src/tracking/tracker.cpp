@@ -27,6 +27,8 @@ double millisecondsSince(Clock::time_point start) {
 constexpr double kLongestStep = 0.25;   // [s] longer gaps count as this long
 constexpr int kHypotheses = 4;          // refined a frame
 constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
+constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
+constexpr double kExact = 0.5;               // [px]
 constexpr int kPatience = 3;            // frames below it before the object counts as lost
 constexpr double kFoundSupport = 0.6;   // share of the contour that a found pose must have
 constexpr int kNearFrames = 30;         // for which a lost object is looked for near its last pose
@@ -284,7 +286,9 @@ class Tracker::Impl {
 
   void takeOver(const RefinedPose& refined) {
     report_.support = refined.support();
-    const bool supported = report_.support >= kLeastSupport;
+    const bool supported =
+        report_.support >= kLeastSupport ||
+        (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_);
     if (confirming_) {
       confirming_ = false;
       frames_lost_ = 0;

@@ -42,8 +42,8 @@ struct ViewChoice {
 ///
 /// Convex polyhedra: exact, one view for each set of faces that look at the eye. Cylinder: exact but
 /// for the places of the two limbs, which are stored in steps of 2 deg (their images move by the
-/// square of that). Meshes: a view sphere of 642 directions times four distances, hidden lines
-/// removed with a depth buffer; outlines, self-occlusions and creases sharper than 30 deg.
+/// square of that). Meshes: a view sphere of 642 directions times four to six distances, hidden lines
+/// removed by casting rays; outlines, self-occlusions and creases sharper than 30 deg.
 class ContourModel {
  public:
   /// @param points scored a view, rounded up to a multiple of 16
