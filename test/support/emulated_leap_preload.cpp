@@ -25,10 +25,12 @@ struct Emulation {
   EmulatedBus bus;
 };
 
-bool isNodeletManager() {
+bool isWanted() {
   std::ifstream file("/proc/self/cmdline");
   std::vector<std::string> words;
   for (std::string word; std::getline(file, word, '\0');) words.push_back(word);
+  if (const char* wanted = std::getenv("LEAP_EMULATED_IN"))
+    return std::strcmp(program_invocation_short_name, wanted) == 0;
   return words.size() > 1 && std::strcmp(program_invocation_short_name, "nodelet") == 0 &&
          words[1] == "manager";
 }
@@ -70,7 +72,7 @@ void prepare(Emulation& emulation, const Scene& scene, std::size_t count) {
 
 __attribute__((constructor)) void plugEmulatedLeap() {
   const char* path = std::getenv("LEAP_EMULATED_SCENE");
-  if (!path || !isNodeletManager()) return;
+  if (!path || !isWanted()) return;
   const Scene scene = sceneToShow(path);
   auto* emulation = new Emulation;
   const auto pictures = static_cast<std::size_t>(number("LEAP_EMULATED_FRAMES", 0));
