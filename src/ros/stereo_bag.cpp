@@ -69,18 +69,27 @@ void StereoBag::readCalibration() {
   }
 }
 
+StampedPose StereoBag::truthFrom(const rosbag::MessageInstance& entry) const {
+  const auto message = entry.instantiate<geometry_msgs::PoseStamped>();
+  if (!message) complain(topics_.truth + " holds no geometry_msgs/PoseStamped");
+  try {
+    return {stampFrom(message->header.stamp), poseFrom(message->pose), {}};
+  } catch (const std::invalid_argument& error) {
+    complain(topics_.truth + ": " + error.what());
+  }
+}
+
 Trajectory StereoBag::truth() const {
   Trajectory truth;
-  for (const auto& entry : rosbag::View(bag_, rosbag::TopicQuery(topics_.truth))) {
-    const auto message = entry.instantiate<geometry_msgs::PoseStamped>();
-    if (!message) complain(topics_.truth + " holds no geometry_msgs/PoseStamped");
-    try {
-      truth.push_back({stampFrom(message->header.stamp), poseFrom(message->pose), {}});
-    } catch (const std::invalid_argument& error) {
-      complain(topics_.truth + ": " + error.what());
-    }
-  }
+  for (const auto& entry : rosbag::View(bag_, rosbag::TopicQuery(topics_.truth)))
+    truth.push_back(truthFrom(entry));
   return truth;
+}
+
+std::optional<StampedPose> StereoBag::firstTruth() const {
+  rosbag::View view(bag_, rosbag::TopicQuery(topics_.truth));
+  if (view.size() == 0) return std::nullopt;
+  return truthFrom(*view.begin());
 }
 
 std::unique_ptr<tf2::BufferCore> StereoBag::transforms() const {
@@ -95,10 +104,13 @@ std::unique_ptr<tf2::BufferCore> StereoBag::transforms() const {
   return buffer;
 }
 
-std::size_t StereoBag::forEachPair(const std::function<void(const RawStereoFrame&)>& use) const {
+StereoBag::Rest StereoBag::forEachPair(
+    const std::function<void(const RawStereoFrame&)>& use) const {
   using ImagePtr = sensor_msgs::Image::ConstPtr;
   std::deque<ImagePtr> left_waiting, right_waiting;
-  std::size_t alone = 0, pairs = 0;
+  Rest rest;
+  std::size_t& alone = rest.images_left_alone;
+  std::size_t pairs = 0;
   double smallest_difference = std::numeric_limits<double>::infinity();
 
   const auto pixels = [&](const ImagePtr& image, const std::string& topic) {
@@ -140,12 +152,16 @@ std::size_t StereoBag::forEachPair(const std::function<void(const RawStereoFrame
     }
   };
 
-  std::vector<std::string> topics{topics_.left_info, topics_.right_info};
+  std::vector<std::string> topics{topics_.left_info, topics_.right_info, topics_.truth};
   if (eyes_ != Eyes::kRight) topics.push_back(topics_.left_image);
   if (eyes_ != Eyes::kLeft) topics.push_back(topics_.right_image);
   try {
     for (const auto& entry : rosbag::View(bag_, rosbag::TopicQuery(topics))) {
       const std::string& topic = entry.getTopic();
+      if (topic == topics_.truth) {
+        rest.truth.push_back(truthFrom(entry));
+        continue;
+      }
       if (topic == topics_.left_info || topic == topics_.right_info) {
         const auto info = entry.instantiate<sensor_msgs::CameraInfo>();
         if (!info || !sameCamera(*info, topic == topics_.left_info ? left_info_ : right_info_))
@@ -168,7 +184,8 @@ std::size_t StereoBag::forEachPair(const std::function<void(const RawStereoFrame
   if (pairs == 0)
     complain("no left and right image have the same stamp; the nearest two are " +
              std::to_string(1e3 * smallest_difference) + " ms apart");
-  return alone + left_waiting.size() + right_waiting.size();
+  alone += left_waiting.size() + right_waiting.size();
+  return rest;
 }
 
 }  // namespace leap_object_tracker

@@ -38,21 +38,28 @@ class StereoBag {
   /// Pairs that the bag can hold at most.
   std::size_t mostPairs() const { return most_pairs_; }
 
-  /// The true poses; empty if the bag has none.
+  /// All true poses, by a walk through the whole bag; empty if it has none.
   Trajectory truth() const;
+  /// The first true pose, if the bag has any.
+  std::optional<StampedPose> firstTruth() const;
 
   /// All transforms of the bag.
   std::unique_ptr<tf2::BufferCore> transforms() const;
 
+  /// What a walk through the whole bag brings beside the pairs.
+  struct Rest {
+    Trajectory truth;                   ///< empty if the bag has none
+    std::size_t images_left_alone = 0;  ///< whose other eye was missing
+  };
   /// Calls `use` once for every pair of equal stamps, in the order of the bag.
-  /// @return number of images whose other eye was missing
-  std::size_t forEachPair(const std::function<void(const RawStereoFrame&)>& use) const;
+  Rest forEachPair(const std::function<void(const RawStereoFrame&)>& use) const;
 
  private:
   [[noreturn]] void complain(const std::string& what) const;
   std::size_t count(const std::string& topic) const;
   std::optional<sensor_msgs::CameraInfo> firstInfo(const std::string& topic) const;
   void readCalibration();
+  StampedPose truthFrom(const rosbag::MessageInstance& entry) const;
 
   std::string path_;
   StereoBagTopics topics_;

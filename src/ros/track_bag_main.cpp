@@ -111,7 +111,7 @@ struct Start {
   std::optional<Stamp> stamp;  ///< absent: with the first frame
 };
 
-std::optional<Start> readStart(const CommandLine& line, const Trajectory& truth,
+std::optional<Start> readStart(const CommandLine& line, const StereoBag& bag,
                                const TrackerParams& params) {
   const std::string how = line.text("start", "search");
   if (how == "search") {
@@ -120,8 +120,9 @@ std::optional<Start> readStart(const CommandLine& line, const Trajectory& truth,
   }
   Start start;
   if (how == "truth") {
-    if (truth.empty()) throw std::runtime_error("--start truth: the bag has no true poses");
-    start = {truth.front().camera_from_object, truth.front().stamp};
+    const auto truth = bag.firstTruth();
+    if (!truth) throw std::runtime_error("--start truth: the bag has no true poses");
+    start = {truth->camera_from_object, truth->stamp};
   } else {
     start.camera_from_object = poseFrom(how);
   }
@@ -140,8 +141,7 @@ class BagTracking {
         params_(readParams(line)),
         object_(loadObject(line.text("object"))),
         bag_(line.positional().front(), readTopics(line), params_.eyes),
-        truth_(bag_.truth()),
-        start_(readStart(line, truth_, params_)),
+        start_(readStart(line, bag_, params_)),
         rectifier_(bag_.calibration(), rectifiedCamera(bag_.calibration(), rectification(line))),
         tracker_(params_, object_, rectifier_.camera()) {
     if (line.has("fixed-frame")) transforms_ = bag_.transforms();
@@ -157,10 +157,11 @@ class BagTracking {
   }
 
   void run() {
-    const std::size_t alone =
-        bag_.forEachPair([this](const RawStereoFrame& frame) { track(frame); });
+    const auto rest = bag_.forEachPair([this](const RawStereoFrame& frame) { track(frame); });
+    truth_ = rest.truth;
     if (isatty(STDERR_FILENO) != 0) std::fprintf(stderr, "\r%40s\r", "");
-    if (alone > 0) warn(std::to_string(alone) + " images had no partner of the same stamp");
+    if (rest.images_left_alone > 0)
+      warn(std::to_string(rest.images_left_alone) + " images had no partner of the same stamp");
     if (backwards_ > 0)
       warn("time jumped backwards " + std::to_string(backwards_) +
            " times; the poses are written in the order of the bag, figures are of the first run");

@@ -62,7 +62,7 @@ class TrackerNodelet : public NodeletChain {
  protected:
   TrackerNodelet()
       : pairs_(readPairs(kBag)),
-        truth_(StereoBag(kBag, {}, Eyes::kBoth).truth()),
+        truth_(StereoBag(kBag, {}, Eyes::kBoth).firstTruth().value().camera_from_object),
         camera_(nh_),
         status_(nh_, "/leap/tracker/status"),
         poses_(nh_, "/leap/tracker/pose"),
@@ -83,10 +83,10 @@ class TrackerNodelet : public NodeletChain {
     return eventually([&] { return status_.size() > before; });
   }
   std::uint8_t state() const { return status_.messages().back().state; }
-  Pose firstTruth() const { return truth_.front().camera_from_object; }
+  Pose firstTruth() const { return truth_; }
 
   std::vector<StereoMessages> pairs_;
-  Trajectory truth_;
+  Pose truth_;
   StereoCameraPlayer camera_;
   Inbox<TrackerStatus> status_;
   Inbox<geometry_msgs::PoseWithCovarianceStamped> poses_;

@@ -58,21 +58,21 @@ Tracked track(const Expected& expected, int threads,
   params.threads = threads;
   const StereoBag bag(root + "bags/" + expected.bag, {}, params.eyes);
   Tracked run;
-  run.truth = bag.truth();
   run.object = loadObject(root + "config/objects/" + expected.object);
   const StereoRectifier rectifier(bag.calibration(), rectifiedCamera(bag.calibration(), {}));
   Tracker tracker(params, run.object, rectifier.camera());
   if (expected.from_truth)
-    tracker.start(run.truth.front().camera_from_object);
+    tracker.start(bag.firstTruth().value().camera_from_object);
   else
     tracker.search();
-  bag.forEachPair([&](const RawStereoFrame& raw) {
+  const auto rest = bag.forEachPair([&](const RawStereoFrame& raw) {
     if (run.frames.size() == most_frames) return;
     run.frames.push_back(raw.stamp);
     const auto estimate = tracker.track(rectifier.rectify(raw));
     if (estimate)
       run.poses.push_back({estimate->stamp, estimate->camera_from_object, estimate->covariance});
   });
+  run.truth = rest.truth;
   return run;
 }
 
