@@ -14,6 +14,9 @@ class ContourModel::Table {
   virtual ~Table() = default;
   virtual ViewChoice choose(const Eigen::Vector3f& eye) const = 0;
   virtual int size() const = 0;
+  virtual std::optional<ContourView> exactView(const Eigen::Vector3d& /*eye*/) const {
+    return std::nullopt;
+  }
 };
 
 namespace {
@@ -191,7 +194,8 @@ class CylinderTable : public ContourModel::Table {
 /// Nearest view of a view sphere, looked up by the direction's place on a cube.
 class MeshTable : public ContourModel::Table {
  public:
-  explicit MeshTable(MeshViews views) : views_(std::move(views)) {
+  MeshTable(const Mesh& mesh, int points, MeshViews views)
+      : points_(points), contour_(mesh), views_(std::move(views)) {
     lookup_.resize(6 * kSide * kSide);
     for (int cell = 0; cell < 6 * kSide * kSide; ++cell) {
       const Eigen::Vector3f direction = directionOfCell(cell);
@@ -213,6 +217,10 @@ class MeshTable : public ContourModel::Table {
   }
 
   int size() const override { return static_cast<int>(views_.views.size()); }
+
+  std::optional<ContourView> exactView(const Eigen::Vector3d& eye) const override {
+    return contour_.viewFrom(eye, points_);
+  }
 
  private:
   static constexpr int kSide = 48;
@@ -236,6 +244,8 @@ class MeshTable : public ContourModel::Table {
     return v.normalized();
   }
 
+  int points_;
+  MeshContour contour_;
   MeshViews views_;
   std::vector<std::size_t> lookup_;
 };
@@ -252,7 +262,8 @@ std::unique_ptr<ContourModel::Table> makeTable(const ObjectModel& object, int po
     case Shape::kMesh:
       break;
   }
-  return std::make_unique<MeshTable>(makeMeshViews(object.mesh, points, cache_folder));
+  return std::make_unique<MeshTable>(object.mesh, points,
+                                     makeMeshViews(object.mesh, points, cache_folder));
 }
 
 }  // namespace
@@ -268,6 +279,10 @@ ContourModel::ContourModel(ContourModel&&) noexcept = default;
 
 ViewChoice ContourModel::choose(const Eigen::Vector3f& eye_in_object) const {
   return table_->choose(eye_in_object);
+}
+
+std::optional<ContourView> ContourModel::exactView(const Eigen::Vector3d& eye_in_object) const {
+  return table_->exactView(eye_in_object);
 }
 
 int ContourModel::viewCount() const { return table_->size(); }

@@ -592,6 +592,18 @@ class ViewFile {
 
 }  // namespace
 
+class MeshContour::Finder : public ContourFinder {
+ public:
+  using ContourFinder::ContourFinder;
+};
+
+MeshContour::MeshContour(const Mesh& mesh) : finder_(std::make_unique<Finder>(mesh)) {}
+MeshContour::~MeshContour() = default;
+
+ContourView MeshContour::viewFrom(const Eigen::Vector3d& eye, int points) const {
+  return makeView(finder_->segmentsFrom(eye), points);
+}
+
 MeshViews makeMeshViews(const Mesh& mesh, int points, const std::string& cache_folder) {
   if (cache_folder.empty()) return computeViews(mesh, points);
   const ViewFile file(mesh, points, cache_folder);

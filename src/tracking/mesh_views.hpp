@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,5 +22,19 @@ struct MeshViews {
 /// @param cache_folder where the result is kept, named by its content; empty: nowhere. A folder that
 /// cannot be written to, or a damaged file in it, is ignored.
 MeshViews makeMeshViews(const Mesh& mesh, int points, const std::string& cache_folder);
+
+/// The visible contour of a mesh from one place, computed then and there.
+class MeshContour {
+ public:
+  explicit MeshContour(const Mesh& mesh);
+  ~MeshContour();
+
+  /// @param eye [m] in the object frame; views.points is empty from inside the body
+  ContourView viewFrom(const Eigen::Vector3d& eye, int points) const;
+
+ private:
+  class Finder;
+  std::unique_ptr<Finder> finder_;
+};
 
 }  // namespace leap_object_tracker

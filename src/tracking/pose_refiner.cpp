@@ -120,8 +120,9 @@ PoseRefiner::PoseRefiner(const ContourParams& params, const RectifiedStereoCamer
     : params_(params), camera_(camera) {}
 
 void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2>& fields,
-                        const Pose& pose, double range, double bright_inside,
-                        std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const {
+                        const Pose& pose, const std::array<ContourView, 2>* exact, double range,
+                        double bright_inside, std::vector<Match>& matches,
+                        std::array<EyeSupport, 2>& eyes) const {
   matches.clear();
   const double focal = camera_.focal_length;
   std::array<float, 2 * kLongestRange + 5> profile{};
@@ -132,8 +133,11 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
     const Sampler sample(field);
     const Eigen::Vector3d eye_place(eye == 0 ? 0 : camera_.baseline, 0, 0);
     const Eigen::Vector3d origin = pose.translation() - eye_place;
-    const ViewChoice choice =
-        model.choose((-(pose.linear().transpose() * origin)).cast<float>());
+    ViewChoice choice;
+    if (exact != nullptr)
+      choice.view = &(*exact)[static_cast<std::size_t>(eye)];
+    else
+      choice = model.choose((-(pose.linear().transpose() * origin)).cast<float>());
     if (choice.view == nullptr) continue;
     Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
     turn(0, 0) = turn(1, 1) = choice.cosine;
@@ -255,7 +259,8 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
 
 RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                                 const Pose& start, const PosePrior& prior, double bright_inside,
-                                const std::vector<double>& ranges) const {
+                                const std::vector<double>& ranges,
+                                const std::array<ContourView, 2>* exact) const {
   RefinedPose result;
   result.camera_from_object = start;
   thread_local std::vector<Match> matches;
@@ -273,7 +278,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   };
 
   for (const double range : ranges) {
-    match(model, fields, pose, range, bright_inside, matches, result.eyes);
+    match(model, fields, pose, exact, range, bright_inside, matches, result.eyes);
     const double deviation = robustScale(range);
     const double limit = std::min(range + 1, 4.685 * std::max(deviation, params_.edge_sigma));
     // Edges that lie farther off than their noise says share a wrong pose, not wrong edges.
@@ -300,7 +305,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   }
 
   const double last_range = 2.5;
-  match(model, fields, pose, last_range, bright_inside, matches, result.eyes);
+  match(model, fields, pose, exact, last_range, bright_inside, matches, result.eyes);
   const double deviation = robustScale(last_range);
   result.residual = deviation;
   double bright = 0, judged = 0;

@@ -281,7 +281,23 @@ class Tracker::Impl {
     RefinedPose best = refined[0];
     for (const RefinedPose& candidate : refined)
       if (score(candidate) > score(best)) best = candidate;
+    polish(best, prior);
     return best;
+  }
+
+  /// Refines once more on the contour of exactly this view, where the model knows only one nearby.
+  void polish(RefinedPose& refined, const PosePrior& prior) const {
+    std::array<std::optional<ContourView>, 2> views;
+    tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
+      Eigen::Vector3d origin = refined.camera_from_object.translation();
+      if (eye == 1) origin.x() -= camera_.baseline;
+      views[eye] =
+          model_.exactView(-(refined.camera_from_object.linear().transpose() * origin));
+    });
+    if (!views[0] || !views[1]) return;
+    const std::array<ContourView, 2> exact{*std::move(views[0]), *std::move(views[1])};
+    refined = refiner_.refine(model_, measurement_.fields(), refined.camera_from_object, prior,
+                              bright_inside_, {3, 2.5}, &exact);
   }
 
   void takeOver(const RefinedPose& refined) {

@@ -51,16 +51,18 @@ class PoseRefiner {
   PoseRefiner(const ContourParams& params, const RectifiedStereoCamera& camera);
 
   /// @param ranges [px] half length of the search of each iteration
+  /// @param exact views of both eyes to use instead of the model's, from a place close by
   RefinedPose refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                      const Pose& start, const PosePrior& prior, double bright_inside,
-                     const std::vector<double>& ranges) const;
+                     const std::vector<double>& ranges,
+                     const std::array<ContourView, 2>* exact = nullptr) const;
 
  private:
   struct Match;
   static void findClearances(std::size_t first, std::vector<Match>& matches);
   void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
-             double range, double bright_inside, std::vector<Match>& matches,
-             std::array<EyeSupport, 2>& eyes) const;
+             const std::array<ContourView, 2>* exact, double range, double bright_inside,
+             std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const;
 
   ContourParams params_;
   RectifiedStereoCamera camera_;
