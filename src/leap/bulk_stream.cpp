@@ -27,7 +27,9 @@ void hurry(std::thread& thread) {
 
 void handleEvents(libusb_context* context, std::chrono::microseconds timeout) {
   timeval wait = toTimeval(timeout);
-  libusb_handle_events_timeout_completed(context, &wait, nullptr);
+  const int code = libusb_handle_events_timeout_completed(context, &wait, nullptr);
+  const bool did_not_wait = code != LIBUSB_SUCCESS && code != LIBUSB_ERROR_INTERRUPTED;
+  if (did_not_wait) std::this_thread::sleep_for(kPauseAfterError);
 }
 
 }  // namespace
