@@ -17,10 +17,10 @@ namespace {
 
 constexpr int kMargin = 20;          // [scaled px] reach of a descriptor, whatever its roll
 constexpr int kCornerSpacing = 3;    // [scaled px] between corners that are kept
-constexpr int kLowestThreshold = 3;  // [grey levels] of FAST, above the sensor's noise
+constexpr int kLowestThreshold = 4;  // [grey levels] of FAST, above the sensor's noise
 constexpr double kLeastZoom = 0.5;
 constexpr double kMostZoom = 3.0;
-constexpr int kPatch = 4;        // [scaled px] half size of the patch that confirms a match
+constexpr int kPatch = 5;        // [scaled px] half size of the patch that confirms a match
 constexpr int kPatchSearch = 3;  // [scaled px] to both sides
 constexpr double kLeastCorrelation = 0.70;
 constexpr double kSurfThreshold = 30;  // of dlib's determinant of the Hessian, its own default
