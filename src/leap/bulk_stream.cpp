@@ -11,6 +11,7 @@ namespace {
 constexpr int kFewestTransfers = 4;
 constexpr int kMostFailuresInRow = 50;
 constexpr std::chrono::milliseconds kPauseAfterError{5};
+constexpr std::chrono::microseconds kRest{1000};
 constexpr std::chrono::seconds kDrainTimeout{2};
 constexpr int kPriority = 10;  // of real-time threads
 
@@ -138,9 +139,12 @@ void BulkStream::submit(Transfer& transfer) {
 
 void BulkStream::run() {
   while (!stopping_ && !unplugged_ && !failed_) {
+    const std::uint64_t before = payloads_;
     handleEvents(link_.context().get(),
                  allInFlight() ? std::chrono::milliseconds(100) : kPauseAfterError);
     recover();
+    // Several payloads are fetched at one waking; the transfers in flight last far longer.
+    if (payloads_ != before) std::this_thread::sleep_for(kRest);
   }
   drain();
   // Control requests and hot-plug messages still want to be served.
