@@ -157,11 +157,9 @@ std::vector<std::string> contourKernelTargets() {
 }
 
 void useContourKernelTarget(const std::string& name) {
-  if (name.empty()) {
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    return;
-  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  if (name.empty()) return;
   for (const auto target : hwy::SupportedAndGeneratedTargets())
     if (name == hwy::TargetName(target)) {
       hwy::SetSupportedTargetsForTest(target);

@@ -31,6 +31,7 @@ constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies e
 constexpr double kExact = 0.5;               // [px]
 constexpr int kPatience = 3;            // frames below it before the object counts as lost
 constexpr double kFoundSupport = 0.6;   // share of the contour that a found pose must have
+constexpr float kOutsideVolume = 1000;  // [nats] against a pose outside the working volume
 constexpr int kNearFrames = 30;         // for which a lost object is looked for near its last pose
 constexpr double kFoundPositionSigma = 0.003;  // [m]
 constexpr double kFoundRotationSigma = 0.05;   // [rad]
@@ -219,6 +220,11 @@ class Tracker::Impl {
     const auto scorer = [&](Sharpness sharpness) {
       return [this, sharpness](const ParticlePose* poses, std::size_t count, float* out) {
         measurement_.score(model_, sharpness, poses, count, out);
+        for (std::size_t i = 0; i < count; ++i) {
+          const float depth = poses[i].translation[2];
+          if (!(depth > params_.volume.nearest && depth < params_.volume.farthest))
+            out[i] -= kOutsideVolume;
+        }
       };
     };
     for (int layer = 0; layer + 1 < params_.filter.layers; ++layer)

@@ -1,0 +1,139 @@
+#include "leap_object_tracker/tracking/tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "drawn_box.hpp"
+
+namespace leap_object_tracker {
+namespace {
+
+constexpr double kPeriod = 0.02;  // [s]
+
+class MovingBox : public ::testing::Test {
+ protected:
+  Pose truthAt(int frame) const {
+    const double t = frame * kPeriod;
+    Pose pose = poseAt(0.02 * std::sin(3 * t), 0.005, 0.12 + 0.02 * std::sin(2 * t));
+    pose.linear() = rotationFromVector({0, 0.5 * std::sin(2 * t), 0}) * pose.linear();
+    return pose;
+  }
+  RectifiedStereoFrame frameAt(int frame) const {
+    return drawnFrame(object_, truthAt(frame), camera_, 1 + frame * kPeriod);
+  }
+  RectifiedStereoFrame darkAt(int frame) const {
+    RectifiedStereoFrame dark;
+    dark.stamp = stampFromSeconds(1 + frame * kPeriod);
+    dark.left = cv::Mat(camera_.size, CV_8UC1, cv::Scalar(3));
+    dark.right = dark.left.clone();
+    return dark;
+  }
+  double positionError(const PoseEstimate& estimate, int frame) const {
+    return (estimate.camera_from_object.translation() - truthAt(frame).translation()).norm();
+  }
+
+  const RectifiedStereoCamera camera_ = roundCamera();
+  const ObjectModel object_ = box(0.03, 0.04, 0.05);
+};
+
+TEST_F(MovingBox, isFollowedFromAStartPose) {
+  Tracker tracker(TrackerParams(), object_, camera_);
+  tracker.start(truthAt(0));
+  for (int frame = 0; frame < 30; ++frame) {
+    const auto estimate = tracker.track(frameAt(frame));
+    ASSERT_TRUE(estimate) << frame;
+    EXPECT_LT(positionError(*estimate, frame), 0.001) << frame;
+    EXPECT_LT(angleBetween(estimate->camera_from_object.linear(), truthAt(frame).linear()), 0.03);
+  }
+}
+
+TEST_F(MovingBox, isFoundFromNothingWithinThreeFrames) {
+  Tracker tracker(TrackerParams(), object_, camera_);
+  tracker.search();
+  std::optional<PoseEstimate> estimate;
+  int frame = 0;
+  for (; frame < 3 && !estimate; ++frame) estimate = tracker.track(frameAt(frame));
+  ASSERT_TRUE(estimate);
+  EXPECT_LT(positionError(*estimate, frame - 1), 0.002);
+  EXPECT_LT(angleBetween(estimate->camera_from_object.linear(), truthAt(frame - 1).linear(),
+                         object_.symmetry),
+            0.05);
+}
+
+TEST_F(MovingBox, isGivenUpWhenItIsGoneAndFoundAgain) {
+  Tracker tracker(TrackerParams(), object_, camera_);
+  tracker.start(truthAt(0));
+  int frame = 0;
+  for (; frame < 5; ++frame) tracker.track(frameAt(frame));
+  for (int gone = 0; gone < 10; ++gone, ++frame) tracker.track(darkAt(frame));
+  EXPECT_NE(tracker.report().state, TrackerState::kTracking);
+  EXPECT_FALSE(tracker.track(darkAt(frame++)));
+  std::optional<PoseEstimate> estimate;
+  for (int back = 0; back < 4 && !estimate; ++back, ++frame) estimate = tracker.track(frameAt(frame));
+  ASSERT_TRUE(estimate);
+  EXPECT_LT(positionError(*estimate, frame - 1), 0.002);
+}
+
+TEST_F(MovingBox, hasTheSamePosesWhateverTheNumberOfThreads) {
+  TrackerParams one, two;
+  one.threads = 1;
+  two.threads = 2;
+  Tracker first(one, object_, camera_), second(two, object_, camera_);
+  first.search();
+  second.search();
+  int compared = 0;
+  for (int frame = 0; frame < 8; ++frame) {
+    const auto a = first.track(frameAt(frame)), b = second.track(frameAt(frame));
+    ASSERT_EQ(a.has_value(), b.has_value()) << frame;
+    if (!a) continue;
+    EXPECT_TRUE(a->camera_from_object.isApprox(b->camera_from_object, 0.0)) << frame;
+    ++compared;
+  }
+  EXPECT_GT(compared, 3);
+}
+
+TEST_F(MovingBox, isTrackedByOneEyeWithLessKnownDepth) {
+  TrackerParams params;
+  Tracker both(params, object_, camera_);
+  params.eyes = Eyes::kLeft;
+  Tracker left(params, object_, camera_);
+  both.start(truthAt(0));
+  left.start(truthAt(0));
+  std::optional<PoseEstimate> by_both, by_left;
+  for (int frame = 0; frame < 10; ++frame) {
+    by_both = both.track(frameAt(frame));
+    RectifiedStereoFrame one_eye = frameAt(frame);
+    one_eye.right = cv::Mat();
+    by_left = left.track(one_eye);
+  }
+  ASSERT_TRUE(by_both && by_left);
+  EXPECT_GT(by_left->covariance(2, 2), by_both->covariance(2, 2));
+}
+
+TEST_F(MovingBox, restsInTheFixedFrameWhileTheCameraMoves) {
+  TrackerParams params;
+  Tracker tracker(params, object_, camera_);
+  const Pose fixed_from_object = poseAt(0, 0, 0.14);
+  const auto cameraAt = [](int frame) {
+    Pose pose = Pose::Identity();
+    pose.translation().x() = 0.012 * frame;  // 0.6 m/s
+    return pose;
+  };
+  tracker.start(cameraAt(0).inverse() * fixed_from_object);
+  for (int frame = 0; frame < 6; ++frame) {
+    const Pose seen = cameraAt(frame).inverse() * fixed_from_object;
+    const auto estimate = tracker.track(
+        drawnFrame(object_, seen, camera_, 1 + frame * kPeriod), cameraAt(frame));
+    ASSERT_TRUE(estimate) << frame;
+    EXPECT_LT((estimate->camera_from_object.translation() - seen.translation()).norm(), 0.001);
+  }
+}
+
+TEST(Tracker, refusesACameraWithoutFocalLength) {
+  EXPECT_THROW(Tracker(TrackerParams(), box(0.03, 0.03, 0.03), RectifiedStereoCamera()),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace leap_object_tracker
