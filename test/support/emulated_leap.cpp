@@ -438,7 +438,8 @@ EmulatedLeap::Clock::time_point EmulatedLeap::produce(Clock::time_point now, boo
         frame_start_ + std::chrono::duration_cast<Clock::duration>(
                            period * (kReadOutShare * (payload_number_ + 1) / payloads));
     if (now < due) return due;
-    // While the host waits, nothing is lost: if the emulation is late, that is not the host's fault.
+    // While the host waits, nothing is lost: if the emulation is late, that is not the host's
+    // fault.
     if (host_waits && buffer_.size() >= kDeviceBuffer) return now;
     makePayload();
     if (halted_) return now + kIdle;
