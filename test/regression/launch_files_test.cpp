@@ -77,7 +77,9 @@ TEST_F(LaunchFile, endsInPosesNearTheTruth) {
       << poses_[0]->size() << " poses came";
   for (const auto& inbox : poses_) EXPECT_GT(goodShare(*inbox), 0.9);
   EXPECT_GT(transforms_.size(), 0u);
-  if (private_nh_.param("jumps_back", false)) EXPECT_TRUE(eventually([&] { return jumpedBack(); }));
+  if (private_nh_.param("jumps_back", false)) {
+    EXPECT_TRUE(eventually([&] { return jumpedBack(); }));
+  }
 }
 
 }  // namespace
