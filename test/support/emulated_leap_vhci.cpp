@@ -188,9 +188,8 @@ void EmulatedVhci::serveBulk() {
     const Request done = std::move(waiting_.front());
     waiting_.pop_front();
     const bool too_short = done.filled < done.length && (done.flags & kShortNotOk);
-    lock.unlock();
+    // Still locked: the kernel gives a device up that answers after the request was taken back.
     reply(done, halted ? -EPIPE : too_short ? -EREMOTEIO : 0);
-    lock.lock();
   }
 }
 
