@@ -36,8 +36,8 @@ Mesh extrude(const std::vector<Eigen::Vector2d>& outline, double height) {
 }
 
 bool degenerate(const Mesh& mesh, const Triangle& t) {
-  const Eigen::Vector3d normal = (mesh.vertices[t[1]] - mesh.vertices[t[0]])
-                                     .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
+  const Eigen::Vector3d normal =
+      (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
   return !(normal.norm() > 1e-14);
 }
 

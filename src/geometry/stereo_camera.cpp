@@ -19,8 +19,8 @@ struct Coefficients {
 /// Ray to distorted normalised coordinates (OpenCV's model, k1 k2 p1 p2 k3 k4 k5 k6).
 Eigen::Vector2d distortRational(const Coefficients& d, const Eigen::Vector2d& ray) {
   const double x = ray.x(), y = ray.y(), t = ray.squaredNorm();
-  const double radial = (1 + t * (d[0] + t * (d[1] + t * d[4]))) /
-                        (1 + t * (d[5] + t * (d[6] + t * d[7])));
+  const double radial =
+      (1 + t * (d[0] + t * (d[1] + t * d[4]))) / (1 + t * (d[5] + t * (d[6] + t * d[7])));
   return {x * radial + 2 * d[2] * x * y + d[3] * (t + 2 * x * x),
           y * radial + d[2] * (t + 2 * y * y) + 2 * d[3] * x * y};
 }
@@ -30,16 +30,15 @@ Eigen::Vector2d distortEquidistant(const Coefficients& d, const Eigen::Vector2d&
   const double radius = ray.norm();
   if (radius < 1e-12) return ray;
   const double theta = std::atan(radius), t = theta * theta;
-  return ray *
-         (theta * (1 + t * (d[0] + t * (d[1] + t * (d[2] + t * d[3])))) / radius);
+  return ray * (theta * (1 + t * (d[0] + t * (d[1] + t * (d[2] + t * d[3])))) / radius);
 }
 
 /// Normalised raw coordinates to ray: the direction that the Leap's stored polynomial serves,
 /// k1 k2 k3 / k4 k5 k6, p1 p2.
 Eigen::Vector2d rayOfLeap(const Coefficients& d, const Eigen::Vector2d& raw) {
   const double x = raw.x(), y = raw.y(), t = raw.squaredNorm();
-  const double radial = (1 + t * (d[0] + t * (d[1] + t * d[2]))) /
-                        (1 + t * (d[3] + t * (d[4] + t * d[5])));
+  const double radial =
+      (1 + t * (d[0] + t * (d[1] + t * d[2]))) / (1 + t * (d[3] + t * (d[4] + t * d[5])));
   const double p1 = d[6], p2 = d[7];
   return {x * radial + 2 * p1 * x * y + p2 * (t + 2 * x * x),
           y * radial + p1 * (t + 2 * y * y) + 2 * p2 * x * y};
@@ -103,7 +102,10 @@ Eigen::Vector2d rayFromPixel(const CameraCalibration& camera, const Eigen::Vecto
     case DistortionModel::kEquidistant: {
       if (raw.norm() < 1e-12) return raw;
       const double radius = invertRadius(
-          [&](double r) { return distortEquidistant(d, {r, 0}).x(); }, raw.norm(), 30.0);
+          [&](double r) {
+            return distortEquidistant(d, {r, 0}).x();
+          },
+          raw.norm(), 30.0);
       return raw * (radius / raw.norm());
     }
     case DistortionModel::kPlumbBob:

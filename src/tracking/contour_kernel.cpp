@@ -72,27 +72,27 @@ float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, std::size_
     const auto length = hn::Sqrt(hn::MulAdd(du, du, hn::Mul(dv, dv)));
 
     // Direction of the tangent in steps of 22.5 deg, 0 to 7.
-    auto steps = hn::IfThenElseZero(hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_1, size_u))),
-                                    minus_one);
-    steps = hn::Add(steps, hn::VecFromMask(
-                               di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_2, size_u)))));
-    steps = hn::Add(steps, hn::VecFromMask(
-                               di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_3, size_u)))));
-    steps = hn::Add(steps, hn::VecFromMask(
-                               di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_4, size_u)))));
+    auto steps =
+        hn::IfThenElseZero(hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_1, size_u))), minus_one);
+    steps = hn::Add(
+        steps, hn::VecFromMask(di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_2, size_u)))));
+    steps = hn::Add(
+        steps, hn::VecFromMask(di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_3, size_u)))));
+    steps = hn::Add(
+        steps, hn::VecFromMask(di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_4, size_u)))));
     const auto falling = hn::RebindMask(di, hn::Lt(hn::Mul(du, dv), zero));
-    const auto plane =
-        hn::And(hn::IfThenElse(falling, hn::Add(eight, steps), hn::Sub(hn::Zero(di), steps)), seven);
+    const auto plane = hn::And(
+        hn::IfThenElse(falling, hn::Add(eight, steps), hn::Sub(hn::Zero(di), steps)), seven);
 
-    const auto column = hn::ConvertTo(
-        di, hn::Min(hn::Max(hn::MulAdd(focal, slope_x, shift_u), zero), last_u));
-    const auto row = hn::ConvertTo(
-        di, hn::Min(hn::Max(hn::MulAdd(focal, slope_y, shift_v), zero), last_v));
-    const auto offset = hn::Add(
-        hn::Add(hn::Mul(plane, plane_stride), hn::Mul(row, row_stride)), column);
+    const auto column =
+        hn::ConvertTo(di, hn::Min(hn::Max(hn::MulAdd(focal, slope_x, shift_u), zero), last_u));
+    const auto row =
+        hn::ConvertTo(di, hn::Min(hn::Max(hn::MulAdd(focal, slope_y, shift_v), zero), last_v));
+    const auto offset =
+        hn::Add(hn::Add(hn::Mul(plane, plane_stride), hn::Mul(row, row_stride)), column);
     const auto gain = hn::And(hn::GatherOffset(di, base, offset), byte);
-    const auto centred = hn::Sub(hn::ConvertTo(df, gain),
-                                 hn::Set(df, static_cast<float>(GainMap::kZero)));
+    const auto centred =
+        hn::Sub(hn::ConvertTo(df, gain), hn::Set(df, static_cast<float>(GainMap::kZero)));
     sum = hn::MulAdd(hn::IfThenElseZero(in_front, length), centred, sum);
   }
   return hn::GetLane(hn::SumOfLanes(df, sum));
@@ -121,8 +121,7 @@ void scorePoses(const ContourModel& model, std::size_t points, const EyeView* ey
         turned[k + 2] = r[k + 2];
       }
       const float sum = scoreView(choice.view->arrays.data(),
-                                  static_cast<std::size_t>(model.points()), points, turned, t,
-                                  eye);
+                                  static_cast<std::size_t>(model.points()), points, turned, t, eye);
       total += sum * eye.map->nats_per_step / eye.map->cells_per_pixel;
     }
     log_likelihood[i] = std::isfinite(total) ? total * independent_share : 0.0F;

@@ -8,11 +8,12 @@ namespace leap_object_tracker {
 namespace {
 
 constexpr std::array<float, 2> kSigma = {3.0F, 1.2F};  // [cells] blunt, sharp
-constexpr int kMostCells = 160 * 160;                  // of a gain map; larger regions get larger cells
-constexpr float kIndependentShare = 1 / 3.0F;          // samples per pixel of contour
+constexpr int kMostCells = 160 * 160;          // of a gain map; larger regions get larger cells
+constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 
-/// log(p(d = 0 | edge of the object) / p(any d | no edge of it)) of a Gaussian of the distance with a
-/// uniform share of outliers, against a uniform density over the truncation distance on both sides.
+/// log(p(d = 0 | edge of the object) / p(any d | no edge of it)) of a Gaussian of the distance with
+/// a uniform share of outliers, against a uniform density over the truncation distance on both
+/// sides.
 float logRatio(float sigma, double outlier_share, double truncation) {
   const double peak = (1 - outlier_share) / (std::sqrt(2 * M_PI) * sigma);
   const double uniform = 1 / (2 * truncation);
@@ -35,9 +36,8 @@ void ContourMeasurement::observe(const RectifiedStereoFrame& frame,
     while (fields_[eye].region().area() / (coarseness * coarseness) > kMostCells) coarseness *= 2;
     for (std::size_t sharpness = 0; sharpness < 2; ++sharpness) {
       const float sigma = kSigma[sharpness];
-      fields_[eye].transform(
-          {sigma, logRatio(sigma, params_.outlier_share, params_.truncation)}, coarseness,
-          maps_[sharpness][eye]);
+      fields_[eye].transform({sigma, logRatio(sigma, params_.outlier_share, params_.truncation)},
+                             coarseness, maps_[sharpness][eye]);
     }
   });
 }

@@ -21,9 +21,10 @@ class ContourModel::Table {
 
 namespace {
 
-/// From a sharp edge to where its outline lies, on average over the views, when the edge is rounded.
-/// With h half the angle between the normals, the outline lies inside of the sharp one by
-/// radius * (cos(a) / cos(h) - 1), a within +-h of the bisector; its mean is radius * (tan(h) / h - 1).
+/// From a sharp edge to where its outline lies, on average over the views, when the edge is
+/// rounded. With h half the angle between the normals, the outline lies inside of the sharp one by
+/// radius * (cos(a) / cos(h) - 1), a within +-h of the bisector; its mean is radius * (tan(h) / h -
+/// 1).
 Eigen::Vector3d roundedEdgeShift(const Eigen::Vector3d& normal_a, const Eigen::Vector3d& normal_b,
                                  double radius) {
   const double h = 0.5 * std::acos(std::clamp(normal_a.dot(normal_b), -1.0, 1.0));
@@ -74,8 +75,7 @@ class PolyhedronTable : public ContourModel::Table {
       std::array<std::size_t, 2> sides{};
       std::array<Eigen::Vector3d, 2> normals;
       for (std::size_t side = 0; side < 2; ++side) {
-        normals[side] =
-            triangleNormal(mesh, static_cast<std::size_t>(adjacency.triangles[side]));
+        normals[side] = triangleNormal(mesh, static_cast<std::size_t>(adjacency.triangles[side]));
         sides[side] = faceOf(normals[side], normals[side].dot(start));
       }
       if (sides[0] == sides[1]) continue;
@@ -116,10 +116,10 @@ class CylinderTable : public ContourModel::Table {
     for (const int cap : {-1, 0, 1})
       for (int step = 0; step < kLimbSteps; ++step)
         views_.push_back(makeView(
-            segments(radius, height, edge_radius, cap,
-                     (step + 0.5) * (M_PI / 2) / kLimbSteps),
+            segments(radius, height, edge_radius, cap, (step + 0.5) * (M_PI / 2) / kLimbSteps),
             points));
-    for (const int cap : {-1, 1}) axial_.push_back(makeView(axial(radius, height, edge_radius, cap), points));
+    for (const int cap : {-1, 1})
+      axial_.push_back(makeView(axial(radius, height, edge_radius, cap), points));
   }
 
   ViewChoice choose(const Eigen::Vector3f& eye) const override {
@@ -130,8 +130,8 @@ class CylinderTable : public ContourModel::Table {
       return {&axial_[cap < 0 ? 0 : 1], 1, 0};
     }
     const float limb = std::acos(radius_ / across);
-    const int step = std::min(static_cast<int>(limb * (kLimbSteps / (static_cast<float>(M_PI) / 2))),
-                              kLimbSteps - 1);
+    const int step = std::min(
+        static_cast<int>(limb * (kLimbSteps / (static_cast<float>(M_PI) / 2))), kLimbSteps - 1);
     return {&views_[static_cast<std::size_t>((cap + 1) * kLimbSteps + step)], eye.x() / across,
             eye.y() / across};
   }
@@ -152,28 +152,32 @@ class CylinderTable : public ContourModel::Table {
       all.push_back({foot - up, foot + up, normal, true});
     }
     for (const int end : {-1, 1})
-      addRim(radius, height, edge_radius, end, [&](double angle, const Eigen::Vector3d& radial) {
-        const bool side_seen = std::abs(angle) < limb, cap_seen = cap == end;
-        if (side_seen && cap_seen) return std::make_pair(true, Eigen::Vector3d(0, 0, 0));
-        if (side_seen) return std::make_pair(true, Eigen::Vector3d(0, 0, end));
-        return std::make_pair(cap_seen, radial);
-      }, all);
+      addRim(
+          radius, height, edge_radius, end,
+          [&](double angle, const Eigen::Vector3d& radial) {
+            const bool side_seen = std::abs(angle) < limb, cap_seen = cap == end;
+            if (side_seen && cap_seen) return std::make_pair(true, Eigen::Vector3d(0, 0, 0));
+            if (side_seen) return std::make_pair(true, Eigen::Vector3d(0, 0, end));
+            return std::make_pair(cap_seen, radial);
+          },
+          all);
     return all;
   }
 
   static std::vector<ContourSegment> axial(double radius, double height, double edge_radius,
                                            int cap) {
     std::vector<ContourSegment> all;
-    addRim(radius, height, edge_radius, cap,
-           [](double, const Eigen::Vector3d& radial) { return std::make_pair(true, radial); }, all);
+    addRim(
+        radius, height, edge_radius, cap,
+        [](double, const Eigen::Vector3d& radial) { return std::make_pair(true, radial); }, all);
     return all;
   }
 
   template <class Judge>
   static void addRim(double full_radius, double height, double edge_radius, int end,
                      const Judge& judge, std::vector<ContourSegment>& all) {
-    const Eigen::Vector3d shift = roundedEdgeShift(Eigen::Vector3d::UnitX(),
-                                                   end * Eigen::Vector3d::UnitZ(), edge_radius);
+    const Eigen::Vector3d shift =
+        roundedEdgeShift(Eigen::Vector3d::UnitX(), end * Eigen::Vector3d::UnitZ(), edge_radius);
     const double radius = full_radius + shift.x(), z = end * height / 2 + shift.z();
     const auto at = [&](double angle) {
       return Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), z);

@@ -8,7 +8,7 @@ namespace leap_object_tracker {
 namespace {
 
 constexpr int kMargin = GainMap::kMargin;
-constexpr int kStampRow = 32;  // [bytes]
+constexpr int kStampRow = 32;       // [bytes]
 constexpr double kSmoothing = 1.0;  // [px]
 
 /// Grey levels to a scale on which shot and read noise look the same everywhere (Anscombe 1948,
@@ -19,8 +19,8 @@ const cv::Mat& varianceStabilizer() {
     cv::Mat values(1, 256, CV_8UC1);
     const double scale = 255 / (std::sqrt(255 + kOffset) - std::sqrt(kOffset));
     for (int i = 0; i < 256; ++i)
-      values.at<std::uint8_t>(i) = cv::saturate_cast<std::uint8_t>(
-          scale * (std::sqrt(i + kOffset) - std::sqrt(kOffset)));
+      values.at<std::uint8_t>(i) =
+          cv::saturate_cast<std::uint8_t>(scale * (std::sqrt(i + kOffset) - std::sqrt(kOffset)));
     return values;
   }();
   return table;
@@ -95,8 +95,8 @@ void EdgeField::transform(const EdgeKernel& kernel, int coarseness, GainMap& map
   map.nats_per_step = kernel.log_ratio / 127.0F;
   map.gains.assign(static_cast<std::size_t>(GainMap::kDirections * map.plane_stride + 64), 0);
 
-  const int reach = std::min(
-      15, static_cast<int>(std::floor(kernel.sigma * std::sqrt(2 * kernel.log_ratio))));
+  const int reach =
+      std::min(15, static_cast<int>(std::floor(kernel.sigma * std::sqrt(2 * kernel.log_ratio))));
   std::array<std::array<std::uint8_t, kStampRow>, kStampRow> stamp{};
   for (int y = -reach; y <= reach; ++y)
     for (int x = -reach; x <= reach; ++x) {
@@ -108,7 +108,8 @@ void EdgeField::transform(const EdgeKernel& kernel, int coarseness, GainMap& map
 
   std::uint8_t* first = map.first();
   for (const Edgel& edgel : edgels_) {
-    const int x = (edgel.u - region_.x) / coarseness + 1, y = (edgel.v - region_.y) / coarseness + 1;
+    const int x = (edgel.u - region_.x) / coarseness + 1,
+              y = (edgel.v - region_.y) / coarseness + 1;
     if (x >= map.width || y >= map.height) continue;
     const int low = edgel.direction / 32;
     for (const int plane : {low, (low + 1) % GainMap::kDirections}) {

@@ -17,10 +17,10 @@ struct MeshViews {
   std::vector<ContourView> views;           ///< shell by shell, all directions of a shell together
 };
 
-/// Finds outlines, self-occlusions and creases sharper than 30 deg that are visible from each place,
-/// by casting rays. Uses all cores.
-/// @param cache_folder where the result is kept, named by its content; empty: nowhere. A folder that
-/// cannot be written to, or a damaged file in it, is ignored.
+/// Finds outlines, self-occlusions and creases sharper than 30 deg that are visible from each
+/// place, by casting rays. Uses all cores.
+/// @param cache_folder where the result is kept, named by its content; empty: nowhere. A folder
+/// that cannot be written to, or a damaged file in it, is ignored.
 MeshViews makeMeshViews(const Mesh& mesh, int points, const std::string& cache_folder);
 
 /// The visible contour of a mesh from one place, computed then and there.

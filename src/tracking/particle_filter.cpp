@@ -29,14 +29,14 @@ void move(ParticlePose& pose, const std::array<float, 6>& twist) {
   const float angle = std::sqrt(angle2);
   const float s = angle > 1e-6F ? std::sin(angle) / angle : 1.0F;
   const float c = angle > 1e-3F ? (1 - std::cos(angle)) / angle2 : 0.5F;
-  const float m[9] = {1 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y,
-                      c * x * y + s * z, 1 - c * (x * x + z * z), c * y * z - s * x,
-                      c * x * z - s * y, c * y * z + s * x, 1 - c * (x * x + y * y)};
+  const float m[9] = {1 - c * (y * y + z * z), c * x * y - s * z,       c * x * z + s * y,
+                      c * x * y + s * z,       1 - c * (x * x + z * z), c * y * z - s * x,
+                      c * x * z - s * y,       c * y * z + s * x,       1 - c * (x * x + y * y)};
   const std::array<float, 9> r = pose.rotation;
   for (std::size_t row = 0; row < 3; ++row)
     for (std::size_t column = 0; column < 3; ++column)
-      pose.rotation[3 * row + column] = m[3 * row] * r[column] + m[3 * row + 1] * r[3 + column] +
-                                        m[3 * row + 2] * r[6 + column];
+      pose.rotation[3 * row + column] =
+          m[3 * row] * r[column] + m[3 * row + 1] * r[3 + column] + m[3 * row + 2] * r[6 + column];
 }
 
 /// Gram-Schmidt on the rows, against the drift of many products.
@@ -89,8 +89,8 @@ void ParticleFilter::setCount(int particles) {
   chosen_.resize(count);
 }
 
-void ParticleFilter::initialize(const Pose& mean, const Matrix6d& covariance,
-                                const Twist& velocity, const Matrix6d& velocity_covariance) {
+void ParticleFilter::initialize(const Pose& mean, const Matrix6d& covariance, const Twist& velocity,
+                                const Matrix6d& velocity_covariance) {
   inject(1.0, mean, covariance, velocity, velocity_covariance);
 }
 
@@ -139,8 +139,8 @@ void ParticleFilter::predict(const MotionParams& motion, double dt, const Pose& 
     std::array<float, 6> twist{};
     for (std::size_t k = 0; k < 6; ++k) {
       const auto acceleration =
-          normals[k] * static_cast<float>(k < 3 ? motion.linear_acceleration
-                                                : motion.angular_acceleration);
+          normals[k] *
+          static_cast<float>(k < 3 ? motion.linear_acceleration : motion.angular_acceleration);
       twist[k] = (particle.velocity[k] + 0.5F * acceleration * step) * step;
       particle.velocity[k] = kept * particle.velocity[k] + acceleration * step;
     }

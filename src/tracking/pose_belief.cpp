@@ -49,11 +49,9 @@ void PoseBelief::predict(const MotionParams& motion, double dt, const Pose& came
 
   // Directions that no image binds (the spin of a cylinder) stay within sensible bounds.
   Twist bound;
-  bound << Eigen::Vector3d::Constant(kLargestPosition),
-      Eigen::Vector3d::Constant(kLargestRotation);
+  bound << Eigen::Vector3d::Constant(kLargestPosition), Eigen::Vector3d::Constant(kLargestRotation);
   const Matrix6d known = poseCovariance();
-  const Matrix6d gain =
-      known * (known + Matrix6d(bound.cwiseAbs2().asDiagonal())).inverse();
+  const Matrix6d gain = known * (known + Matrix6d(bound.cwiseAbs2().asDiagonal())).inverse();
   Eigen::Matrix<double, 12, 6> cross = covariance.leftCols<6>();
   covariance -= cross * known.ldlt().solve(gain * cross.transpose());
   covariance = (0.5 * (covariance + covariance.transpose())).eval();

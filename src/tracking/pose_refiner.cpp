@@ -6,15 +6,17 @@
 namespace leap_object_tracker {
 namespace {
 
-constexpr double kNearest = 0.01;        // [m]
+constexpr double kNearest = 0.01;         // [m]
 constexpr double kIndependentLength = 3;  // [px] of contour that one independent edge sample needs
 constexpr double kSupportDistance = 1.5;  // [px]
 constexpr int kLongestRange = 24;         // [px]
 constexpr float kClearance = 16;          // [px] lines farther apart do not disturb each other
 constexpr float kAlongside = 4;           // [px]
-// [px] by how much the rounding and the gloss of an edge between two visible faces may move its image.
+// [px] by how much the rounding and the gloss of an edge between two visible faces may move its
+// image.
 constexpr double kCreaseDoubt = 1.2;
-// Edges along one line share their errors: this share of the information of independent ones is left.
+// Edges along one line share their errors: this share of the information of independent ones is
+// left.
 constexpr double kIndependentErrors = 0.4;
 
 /// Grey values of a field at sub-pixel places of the whole image.
@@ -78,13 +80,13 @@ Twist cameraTwistBetween(const Pose& from, const Pose& to) {
 
 /// One contour point that was looked for in one eye.
 struct PoseRefiner::Match {
-  Twist jacobian;       ///< of the offset along the normal, by the camera twist [px]
-  double offset = 0;    ///< [px] from the contour to the edge, along the normal
-  double variance = 1;  ///< [px^2]
-  double samples = 0;   ///< independent ones that the point stands for
-  double length = 0;    ///< [px]
+  Twist jacobian;                 ///< of the offset along the normal, by the camera twist [px]
+  double offset = 0;              ///< [px] from the contour to the edge, along the normal
+  double variance = 1;            ///< [px^2]
+  double samples = 0;             ///< independent ones that the point stands for
+  double length = 0;              ///< [px]
   Eigen::Vector2f place, normal;  ///< [px], unit vector in the image
-  float clearance = 0;    ///< [px] to the next line of the contour beside this one
+  float clearance = 0;            ///< [px] to the next line of the contour beside this one
   int eye = 0;
   bool found = false;
   bool outline = false;
@@ -97,8 +99,8 @@ void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches)
   thread_local std::vector<std::array<float, 4>> lines;
   lines.clear();
   for (std::size_t j = first; j < matches.size(); j += 2)
-    lines.push_back({matches[j].place.x(), matches[j].place.y(), matches[j].normal.x(),
-                     matches[j].normal.y()});
+    lines.push_back(
+        {matches[j].place.x(), matches[j].place.y(), matches[j].normal.x(), matches[j].normal.y()});
   for (std::size_t i = first; i < matches.size(); i += 2) {
     const float u = matches[i].place.x(), v = matches[i].place.y();
     const float nu = matches[i].normal.x(), nv = matches[i].normal.y();
@@ -222,7 +224,8 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
               static_cast<float>(k) + (bend < 0 ? 0.5F * sign * (before - after) / bend : 0.0F);
           if (std::abs(place) > own_range) continue;
           float value = std::sqrt(size) * std::exp(-0.5F * place * place / (blur * blur));
-          // Towards the outside an outline darkens where the object is brighter than what is behind.
+          // Towards the outside an outline darkens where the object is brighter than what is
+          // behind.
           const bool brighter_inside = here < 0;
           if (match.outline)
             value *= static_cast<float>(brighter_inside ? bright_inside : 1 - bright_inside);
@@ -231,8 +234,8 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           match.found = true;
           match.offset = place;
           match.bright_inside = brighter_inside;
-          match.variance = params_.edge_sigma * params_.edge_sigma +
-                           std::pow(weakest / size, 2) + std::pow(crowding, 2) +
+          match.variance = params_.edge_sigma * params_.edge_sigma + std::pow(weakest / size, 2) +
+                           std::pow(crowding, 2) +
                            (match.outline ? 0.0 : kCreaseDoubt * kCreaseDoubt);
         }
         if (match.found) {
@@ -313,8 +316,8 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     double gain = 0;
     if (m.found) {
       const double weight = tukeyWeight(m.offset, 4.685 * std::max(deviation, params_.edge_sigma));
-      result.information.noalias() +=
-          kIndependentErrors * weight * m.samples / m.variance * m.jacobian * m.jacobian.transpose();
+      result.information.noalias() += kIndependentErrors * weight * m.samples / m.variance *
+                                      m.jacobian * m.jacobian.transpose();
       if (m.outline && std::abs(m.offset) < kSupportDistance) {
         judged += m.length;
         if (m.bright_inside) bright += m.length;

@@ -12,13 +12,13 @@
 namespace leap_object_tracker {
 namespace {
 
-constexpr int kOrientations = 4400;     // about 15 deg apart over all of SO(3)
+constexpr int kOrientations = 4400;  // about 15 deg apart over all of SO(3)
 constexpr int kMostPlaces = 14;
-constexpr int kCoarsePoints = 32;       // of the contour, for the first look
+constexpr int kCoarsePoints = 32;          // of the contour, for the first look
 constexpr std::size_t kLikelyPlaces = 3;   // first by how well their blob fits
 constexpr std::size_t kKeptAtLikely = 40;  // hypotheses of such a place that move on
 constexpr std::size_t kKeptElsewhere = 8;
-constexpr int kChildren = 20;              // random steps of each, a round
+constexpr int kChildren = 20;  // random steps of each, a round
 constexpr int kRounds = 4;
 constexpr std::size_t kRefinedAtLikely = 8;
 constexpr std::size_t kRefinedElsewhere = 2;
@@ -56,9 +56,9 @@ std::vector<Eigen::Matrix3d> distinctRotations(const Symmetry& symmetry, int cou
   }
   for (const auto& rotation : evenRotations(count)) {
     const double trace = rotation.trace();
-    const bool nearest =
-        std::all_of(symmetry.rotations.begin(), symmetry.rotations.end(),
-                    [&](const Eigen::Matrix3d& g) { return (rotation * g).trace() <= trace + 1e-9; });
+    const bool nearest = std::all_of(
+        symmetry.rotations.begin(), symmetry.rotations.end(),
+        [&](const Eigen::Matrix3d& g) { return (rotation * g).trace() <= trace + 1e-9; });
     if (nearest) kept.push_back(rotation);
   }
   return kept;
@@ -272,8 +272,8 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
           step[k] = size * (k < 3 ? 0.12 * model_->radius() : 0.12) *
                     static_cast<double>(normals[static_cast<std::size_t>(k)]);
         // Along the ray the place is less well known.
-        step.head<3>() += parent.translation().normalized() * (size * 0.03 * depth *
-                                                               static_cast<double>(normals[2]));
+        step.head<3>() += parent.translation().normalized() *
+                          (size * 0.03 * depth * static_cast<double>(normals[2]));
         children.push_back({toParticlePose(movedInCamera(parent, step)), 0, kept[i].place});
       }
       scoreAll(children, model_->points(), mapsFor(depth, round));
@@ -297,9 +297,10 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
     refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, 0.7, {10, 8, 6, 4, 3, 2.5});
   });
-  const auto best = std::max_element(
-      refined.begin(), refined.end(),
-      [](const RefinedPose& a, const RefinedPose& b) { return a.log_likelihood < b.log_likelihood; });
+  const auto best = std::max_element(refined.begin(), refined.end(),
+                                     [](const RefinedPose& a, const RefinedPose& b) {
+                                       return a.log_likelihood < b.log_likelihood;
+                                     });
   const double depth = best->camera_from_object.translation().z();
   if (depth < params_.volume.nearest || depth > params_.volume.farthest) return std::nullopt;
   return *best;

@@ -24,15 +24,15 @@ double millisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-constexpr double kLongestStep = 0.25;   // [s] longer gaps count as this long
-constexpr int kHypotheses = 4;          // refined a frame
-constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
+constexpr double kLongestStep = 0.25;        // [s] longer gaps count as this long
+constexpr int kHypotheses = 4;               // refined a frame
+constexpr double kLeastSupport = 0.40;       // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
 constexpr double kExact = 0.5;               // [px]
-constexpr int kPatience = 3;            // frames below it before the object counts as lost
-constexpr double kFoundSupport = 0.6;   // share of the contour that a found pose must have
-constexpr float kOutsideVolume = 1000;  // [nats] against a pose outside the working volume
-constexpr int kNearFrames = 30;         // for which a lost object is looked for near its last pose
+constexpr int kPatience = 3;                 // frames below it before the object counts as lost
+constexpr double kFoundSupport = 0.6;        // share of the contour that a found pose must have
+constexpr float kOutsideVolume = 1000;       // [nats] against a pose outside the working volume
+constexpr int kNearFrames = 30;  // for which a lost object is looked for near its last pose
 constexpr double kFoundPositionSigma = 0.003;  // [m]
 constexpr double kFoundRotationSigma = 0.05;   // [rad]
 
@@ -66,10 +66,9 @@ class Tracker::Impl {
       high = high.cwiseMax(vertex);
     }
     for (int corner = 0; corner < 8; ++corner)
-      corners_[static_cast<std::size_t>(corner)] =
-          Eigen::Vector3d((corner & 1) != 0 ? high.x() : low.x(),
-                          (corner & 2) != 0 ? high.y() : low.y(),
-                          (corner & 4) != 0 ? high.z() : low.z());
+      corners_[static_cast<std::size_t>(corner)] = Eigen::Vector3d(
+          (corner & 1) != 0 ? high.x() : low.x(), (corner & 2) != 0 ? high.y() : low.y(),
+          (corner & 4) != 0 ? high.z() : low.z());
   }
 
   void start(const Pose& camera_from_object) {
@@ -151,7 +150,8 @@ class Tracker::Impl {
     report_.search_ms = millisecondsSince(started);
     report_.support = found ? found->support() : 0;
     if (!found || report_.support < kFoundSupport) {
-      if (++frames_lost_ > kNearFrames) last_seen_.reset(), report_.state = TrackerState::kSearching;
+      if (++frames_lost_ > kNearFrames)
+        last_seen_.reset(), report_.state = TrackerState::kSearching;
       return;
     }
     Pose pose = found->camera_from_object;
@@ -182,14 +182,14 @@ class Tracker::Impl {
     filter_.predict(params_.motion, dt, camera_motion);
   }
 
-  /// Where the object can be in each eye: the projected bounding box and three deviations around it.
+  /// Where the object can be in each eye: the projected bounding box and three deviations around
+  /// it.
   std::array<cv::Rect, 2> regions(const PoseBelief& belief) const {
     std::array<cv::Rect, 2> regions;
     const cv::Rect whole(cv::Point(), camera_.size);
     const double depth = std::max(0.02, belief.pose.translation().z() - model_.radius());
     const Twist deviation = belief.poseCovariance().diagonal().cwiseMax(0).cwiseSqrt();
-    const double spread = deviation.head<2>().maxCoeff() +
-                          deviation.z() * 0.5 +
+    const double spread = deviation.head<2>().maxCoeff() + deviation.z() * 0.5 +
                           model_.radius() * std::min(0.3, deviation.tail<3>().maxCoeff());
     const double margin =
         std::min(80.0, 10 + 2.5 * camera_.focal_length * spread / std::max(0.04, depth));
@@ -297,8 +297,7 @@ class Tracker::Impl {
     tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
       Eigen::Vector3d origin = refined.camera_from_object.translation();
       if (eye == 1) origin.x() -= camera_.baseline;
-      views[eye] =
-          model_.exactView(-(refined.camera_from_object.linear().transpose() * origin));
+      views[eye] = model_.exactView(-(refined.camera_from_object.linear().transpose() * origin));
     });
     if (!views[0] || !views[1]) return;
     const std::array<ContourView, 2> exact{*std::move(views[0]), *std::move(views[1])};
@@ -345,8 +344,8 @@ class Tracker::Impl {
   int weak_frames_ = 0;
   int frames_lost_ = 0;
   bool fresh_ = false;
-  bool confirming_ = false;          ///< the last search found something
-  std::optional<Pose> last_seen_;    ///< where the object was when the tracker stood by it
+  bool confirming_ = false;        ///< the last search found something
+  std::optional<Pose> last_seen_;  ///< where the object was when the tracker stood by it
 };
 
 Tracker::Tracker(const TrackerParams& params, const ObjectModel& object,

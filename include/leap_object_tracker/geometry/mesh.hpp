@@ -10,7 +10,7 @@ namespace leap_object_tracker {
 
 /// Triangles in the object frame, counter-clockwise seen from outside.
 struct Mesh {
-  std::vector<Eigen::Vector3d> vertices;            ///< [m]
+  std::vector<Eigen::Vector3d> vertices;                ///< [m]
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< indices into vertices
 };
 
@@ -29,7 +29,8 @@ Mesh loadMesh(const std::string& path, double scale);
 
 /// Largest distance of a vertex from the origin [m].
 double radiusOf(const Mesh& mesh);
-/// Largest distance between two vertices [m], searched over 256 directions (short by 0.3 % at most).
+/// Largest distance between two vertices [m], searched over 256 directions (short by 0.3 % at
+/// most).
 double diameterOf(const Mesh& mesh);
 
 }  // namespace leap_object_tracker

@@ -18,11 +18,11 @@ enum class DistortionModel {
 
 /// One eye: how rays become raw pixels, and how the eye is turned into the rectified pair.
 struct CameraCalibration {
-  cv::Size size;                    ///< [px]
-  double fx = 0, fy = 0;            ///< [px]
-  double cx = 0, cy = 0;            ///< [px], pixel centres at integers
+  cv::Size size;          ///< [px]
+  double fx = 0, fy = 0;  ///< [px]
+  double cx = 0, cy = 0;  ///< [px], pixel centres at integers
   DistortionModel distortion_model = DistortionModel::kNone;
-  std::vector<double> distortion;   ///< in the order of the model
+  std::vector<double> distortion;  ///< in the order of the model
   Eigen::Matrix3d rectified_from_raw = Eigen::Matrix3d::Identity();
 };
 
@@ -33,7 +33,8 @@ struct StereoCalibration {
   double baseline = 0;  ///< [m], the right eye sits at +x of the left one in the rectified frame
 };
 
-/// The ideal camera pair that a rectified frame was taken with. Both eyes share all but their place.
+/// The ideal camera pair that a rectified frame was taken with. Both eyes share all but their
+/// place.
 struct RectifiedStereoCamera {
   double focal_length = 0;  ///< [px], the same in x and y
   double center_u = 0;      ///< [px]

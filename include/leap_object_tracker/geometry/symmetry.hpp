@@ -25,8 +25,8 @@ struct Symmetry {
 };
 
 /// The group that the axes span: products of the finite ones; at most one free axis.
-/// @throw std::invalid_argument for a zero axis, a negative order, two free axes, or a group of more
-/// than 120 elements (axes that do not fit each other).
+/// @throw std::invalid_argument for a zero axis, a negative order, two free axes, or a group of
+/// more than 120 elements (axes that do not fit each other).
 Symmetry symmetryFromAxes(const std::vector<Symmetry::Axis>& axes);
 
 /// The pose among the equivalents of `pose` whose orientation is nearest to `reference`.

@@ -12,16 +12,16 @@ namespace leap_object_tracker {
 
 /// One eye of a rectified pair as the scoring kernel needs it.
 struct EyeView {
-  const GainMap* map = nullptr;  ///< nullptr: the eye saw nothing
-  float focal_length = 0;        ///< [px]
+  const GainMap* map = nullptr;      ///< nullptr: the eye saw nothing
+  float focal_length = 0;            ///< [px]
   float center_u = 0, center_v = 0;  ///< [px]
-  float eye_x = 0;               ///< [m] place of the eye along x of the left eye's frame
+  float eye_x = 0;                   ///< [m] place of the eye along x of the left eye's frame
 };
 
-/// Sums, over both eyes and all visible contour points of each pose, projected length [px] times the
-/// gain of the map at the point: a log-likelihood ratio against "no object here", in nats if
-/// `nats_per_pixel` is the share of independent pixels along a contour. Points behind or closer than
-/// 1 cm to the eye, or outside the image, add nothing; a pose inside the body scores zero.
+/// Sums, over both eyes and all visible contour points of each pose, projected length [px] times
+/// the gain of the map at the point: a log-likelihood ratio against "no object here", in nats if
+/// `nats_per_pixel` is the share of independent pixels along a contour. Points behind or closer
+/// than 1 cm to the eye, or outside the image, add nothing; a pose inside the body scores zero.
 ///
 /// The instruction set is chosen at run time.
 /// @param points of each view that are scored, a multiple of 16: less than all are an even sample,

@@ -15,9 +15,9 @@ namespace leap_object_tracker {
 struct ContourPoint {
   Eigen::Vector3f position;  ///< [m]
   Eigen::Vector3f tangent;   ///< unit vector along the contour
-  Eigen::Vector3f outward;   ///< off the body, where only one side of the contour is body; else zero
-  float length = 0;          ///< [m] of contour that the point stands for
-  float limb = 0;            ///< 1 where a curved surface turns away, 0 at an edge of the body
+  Eigen::Vector3f outward;  ///< off the body, where only one side of the contour is body; else zero
+  float length = 0;         ///< [m] of contour that the point stands for
+  float limb = 0;           ///< 1 where a curved surface turns away, 0 at an edge of the body
 
   bool outline() const { return outward.squaredNorm() > 0.5F; }
 };
@@ -32,8 +32,8 @@ struct ContourView {
   std::vector<ContourPoint> points;
 };
 
-/// Which view a pose shows, and how to turn the object first: the views of a cylinder are stored for
-/// one direction only.
+/// Which view a pose shows, and how to turn the object first: the views of a cylinder are stored
+/// for one direction only.
 struct ViewChoice {
   const ContourView* view = nullptr;  ///< nullptr: the eye is inside the body
   float cosine = 1, sine = 0;         ///< of the turn about the object's z axis
@@ -41,10 +41,10 @@ struct ViewChoice {
 
 /// The visible contour of an object from anywhere outside of it.
 ///
-/// Convex polyhedra: exact, one view for each set of faces that look at the eye. Cylinder: exact but
-/// for the places of the two limbs, which are stored in steps of 2 deg (their images move by the
-/// square of that). Meshes: a view sphere of 642 directions times four to six distances, hidden lines
-/// removed by casting rays; outlines, self-occlusions and creases sharper than 30 deg.
+/// Convex polyhedra: exact, one view for each set of faces that look at the eye. Cylinder: exact
+/// but for the places of the two limbs, which are stored in steps of 2 deg (their images move by
+/// the square of that). Meshes: a view sphere of 642 directions times four to six distances, hidden
+/// lines removed by casting rays; outlines, self-occlusions and creases sharper than 30 deg.
 class ContourModel {
  public:
   /// @param points scored a view, rounded up to a multiple of 16

@@ -15,18 +15,19 @@ struct EdgeKernel {
   float log_ratio = 2;  ///< log density of a perfect match over that of no match
 };
 
-/// The truncated distance transform of the edges of one eye, one plane for each of 8 edge directions,
-/// already turned into gains, less the mean gain of the plane: what a contour point would win anywhere.
+/// The truncated distance transform of the edges of one eye, one plane for each of 8 edge
+/// directions, already turned into gains, less the mean gain of the plane: what a contour point
+/// would win anywhere.
 struct GainMap {
   static constexpr int kDirections = 8;
 
-  int width = 0, height = 0;   ///< [cells], with a border of one cell
-  int row_stride = 0;          ///< [bytes]
-  int plane_stride = 0;        ///< [bytes]
+  int width = 0, height = 0;         ///< [cells], with a border of one cell
+  int row_stride = 0;                ///< [bytes]
+  int plane_stride = 0;              ///< [bytes]
   float origin_u = 0, origin_v = 0;  ///< [px] image place of the centre of cell (0, 0)
   float cells_per_pixel = 1;
-  float nats_per_step = 0;     ///< gain of one grey step
-  std::vector<std::uint8_t> gains;   ///< kZero + gain / nats_per_step
+  float nats_per_step = 0;          ///< gain of one grey step
+  std::vector<std::uint8_t> gains;  ///< kZero + gain / nats_per_step
 
   static constexpr int kZero = 112;
   static constexpr int kMargin = 16;  ///< [cells] around each plane

@@ -33,8 +33,9 @@ struct RefinedPose {
   Pose camera_from_object = Pose::Identity();
   Matrix6d information = Matrix6d::Zero();  ///< of the image alone, of the camera twist
   std::array<EyeSupport, 2> eyes;
-  double residual = 0;        ///< [px] robust standard deviation of the edges about the contour
-  double bright_inside = 0;   ///< share of supported outline on whose inner side the image is brighter
+  double residual = 0;  ///< [px] robust standard deviation of the edges about the contour
+  double bright_inside =
+      0;  ///< share of supported outline on whose inner side the image is brighter
   double log_likelihood = 0;  ///< sum over independent samples of the gain against chance [nats]
 
   double support() const {

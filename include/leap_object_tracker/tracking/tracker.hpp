@@ -22,8 +22,8 @@ enum class TrackerState {
 };
 
 struct PoseEstimate {
-  Stamp stamp;                ///< middle of the exposure
-  Pose camera_from_object;    ///< left rectified optical frame from object
+  Stamp stamp;              ///< middle of the exposure
+  Pose camera_from_object;  ///< left rectified optical frame from object
   /// Of (x, y, z [m], rotation about x, y, z [rad]), all along the fixed axes of the camera, as in
   /// geometry_msgs/PoseWithCovariance. The free axis of a symmetric object has the variance of a
   /// uniform angle, pi^2 / 3.

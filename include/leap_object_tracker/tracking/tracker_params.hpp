@@ -9,16 +9,16 @@ enum class Eyes { kBoth, kLeft, kRight };
 
 /// How the object may move between frames.
 struct MotionParams {
-  double linear_acceleration = 6.0;   ///< [m/s^2] standard deviation of the unknown acceleration
-  double angular_acceleration = 40.0; ///< [rad/s^2] the same, of rotation
-  double velocity_damping = 4.0;      ///< [1/s] how fast a velocity that nobody sees dies away
+  double linear_acceleration = 6.0;    ///< [m/s^2] standard deviation of the unknown acceleration
+  double angular_acceleration = 40.0;  ///< [rad/s^2] the same, of rotation
+  double velocity_damping = 4.0;       ///< [1/s] how fast a velocity that nobody sees dies away
 };
 
 /// The particle set.
 struct FilterParams {
-  int particles = 1000;        ///< scored a frame and layer
-  int layers = 2;              ///< annealing layers, from blunt to sharp likelihood
-  double resample_below = 0.5; ///< share of effective particles; 1 after every frame
+  int particles = 1000;         ///< scored a frame and layer
+  int layers = 2;               ///< annealing layers, from blunt to sharp likelihood
+  double resample_below = 0.5;  ///< share of effective particles; 1 after every frame
   std::uint64_t seed = 1;
 };
 
@@ -33,7 +33,7 @@ struct ContourParams {
   /// place: brightness falls to zero there with the square root of the distance, and the steepest
   /// place of that, smoothed by a Gaussian, lies 0.77 of its deviation inside.
   double limb_shift = 0.7;
-  std::string cache_folder;     ///< views of meshes are kept here between runs; empty: nowhere
+  std::string cache_folder;  ///< views of meshes are kept here between runs; empty: nowhere
 };
 
 /// Where the object may be.

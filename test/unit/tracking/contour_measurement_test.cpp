@@ -14,9 +14,7 @@ using Sharpness = ContourMeasurement::Sharpness;
 
 class DrawnBox : public ::testing::Test {
  protected:
-  DrawnBox()
-      : model_(object_, 96),
-        measurement_(ContourParams(), Eyes::kBoth, camera_) {
+  DrawnBox() : model_(object_, 96), measurement_(ContourParams(), Eyes::kBoth, camera_) {
     observe(truth_);
   }
 
@@ -100,9 +98,8 @@ TEST_F(DrawnBox, isRefinedToAFractionOfAMillimetre) {
   for (int axis = 0; axis < 6; ++axis) {
     Twist nudge = Twist::Zero();
     nudge[axis] = axis < 3 ? 0.002 : 0.04;
-    const RefinedPose refined = refiner.refine(model_, measurement_.fields(),
-                                               movedInCamera(truth_, nudge), {}, 0.8,
-                                               {8, 5, 3, 2.5, 2.5});
+    const RefinedPose refined = refiner.refine(
+        model_, measurement_.fields(), movedInCamera(truth_, nudge), {}, 0.8, {8, 5, 3, 2.5, 2.5});
     const Twist error = cameraTwistBetween(truth_, refined.camera_from_object);
     EXPECT_LT(error.head<3>().norm(), 0.0004) << "axis " << axis;
     EXPECT_LT(error.tail<3>().norm(), 0.012) << "axis " << axis;

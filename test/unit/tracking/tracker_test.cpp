@@ -70,7 +70,8 @@ TEST_F(MovingBox, isGivenUpWhenItIsGoneAndFoundAgain) {
   EXPECT_NE(tracker.report().state, TrackerState::kTracking);
   EXPECT_FALSE(tracker.track(darkAt(frame++)));
   std::optional<PoseEstimate> estimate;
-  for (int back = 0; back < 4 && !estimate; ++back, ++frame) estimate = tracker.track(frameAt(frame));
+  for (int back = 0; back < 4 && !estimate; ++back, ++frame)
+    estimate = tracker.track(frameAt(frame));
   ASSERT_TRUE(estimate);
   EXPECT_LT(positionError(*estimate, frame - 1), 0.002);
 }
@@ -123,8 +124,8 @@ TEST_F(MovingBox, restsInTheFixedFrameWhileTheCameraMoves) {
   tracker.start(cameraAt(0).inverse() * fixed_from_object);
   for (int frame = 0; frame < 6; ++frame) {
     const Pose seen = cameraAt(frame).inverse() * fixed_from_object;
-    const auto estimate = tracker.track(
-        drawnFrame(object_, seen, camera_, 1 + frame * kPeriod), cameraAt(frame));
+    const auto estimate =
+        tracker.track(drawnFrame(object_, seen, camera_, 1 + frame * kPeriod), cameraAt(frame));
     ASSERT_TRUE(estimate) << frame;
     EXPECT_LT((estimate->camera_from_object.translation() - seen.translation()).norm(), 0.001);
   }
