@@ -81,17 +81,8 @@ void embedMetadata(cv::Mat& left, cv::Mat& right, const SensorControls& controls
           static_cast<std::uint8_t>(samples[static_cast<std::size_t>(i)]);
 }
 
-SensorControls AutoExposure::after(const cv::Mat& left, const cv::Mat& right,
-                                   const SensorControls& controls) {
-  constexpr double kTarget = 190;           // [counts] of the brightest
+double brightestOf(const cv::Mat& left, const cv::Mat& right) {
   constexpr double kBrightestShare = 2e-3;  // of all pixels
-  constexpr int kEvery = 3, kDelay = 2;     // [frames]
-
-  SensorControls next = controls;
-  if (frames_until_obeyed_ == 0) next = wanted_;
-  if (frames_until_obeyed_ >= 0) --frames_until_obeyed_;
-  if (frames_++ % kEvery != 0 || frames_until_obeyed_ >= 0) return next;
-
   std::array<int, 256> histogram{};
   for (const cv::Mat* image : {&left, &right})
     for (int v = 0; v < image->rows - 1; ++v)
@@ -104,19 +95,36 @@ SensorControls AutoExposure::after(const cv::Mat& left, const cv::Mat& right,
     pixels += taken;
     sum += taken * value;
   }
-  double brightest = std::max(4.0, sum / std::max(1, pixels));
+  return sum / std::max(1, pixels);
+}
+
+SensorControls brighter(const SensorControls& controls, double factor, double longest_exposure_us) {
+  constexpr int kUnitGain = 16, kMostGain = 31;
+  const double product = std::clamp(controls.exposure_us * controls.gain * factor, 10.0 * kUnitGain,
+                                    longest_exposure_us * kMostGain);
+  SensorControls result = controls;
+  result.exposure_us = std::round(std::clamp(product / kUnitGain, 10.0, longest_exposure_us));
+  result.gain =
+      std::clamp(static_cast<int>(std::lround(product / result.exposure_us)), kUnitGain, kMostGain);
+  return result;
+}
+
+SensorControls AutoExposure::after(const cv::Mat& left, const cv::Mat& right,
+                                   const SensorControls& controls) {
+  constexpr double kTarget = 190;        // [counts] of the brightest
+  constexpr int kEvery = 3, kDelay = 2;  // [frames]
+
+  SensorControls next = controls;
+  if (frames_until_obeyed_ == 0) next = wanted_;
+  if (frames_until_obeyed_ >= 0) --frames_until_obeyed_;
+  if (frames_++ % kEvery != 0 || frames_until_obeyed_ >= 0) return next;
+
+  double brightest = std::max(4.0, brightestOf(left, right));
   double target = kTarget;
   if (controls.gamma) brightest *= brightest, target *= target;
   const double factor = std::clamp(target / brightest, 0.7, 1.4);
   if (factor > 0.93 && factor < 1.07) return next;
-
-  constexpr int kUnitGain = 16, kMostGain = 31;
-  const double product = std::clamp(next.exposure_us * next.gain * factor, 10.0 * kUnitGain,
-                                    longest_exposure_us_ * kMostGain);
-  wanted_ = next;
-  wanted_.exposure_us = std::round(std::clamp(product / kUnitGain, 10.0, longest_exposure_us_));
-  wanted_.gain = std::clamp(static_cast<int>(std::lround(product / wanted_.exposure_us)), kUnitGain,
-                            kMostGain);
+  wanted_ = brighter(next, factor, longest_exposure_us_);
   frames_until_obeyed_ = kDelay - 1;
   return next;
 }

@@ -94,6 +94,17 @@ class Simulator::Impl {
     frame_ = 0;
   }
 
+  void restart(const MotionScript& object_motion, const SensorControls& controls,
+               std::uint64_t seed) {
+    rewind();
+    scene_.bodies.front().motion = object_motion;
+    scene_.seed = seed;
+    timing_ = HashRandom(seed, 3);
+    auto_exposure_ = AutoExposure(scene_.sensor.pulse_limit_us);
+    controls_ = controls;
+    frames_ever_ = 0;
+  }
+
   void setControls(const SensorControls& controls) { controls_ = controls; }
   const SensorControls& controls() const { return controls_; }
   const Scene& scene() const { return scene_; }
@@ -122,6 +133,10 @@ Simulator::Simulator(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) 
 Simulator::~Simulator() = default;
 std::optional<SimulatedFrame> Simulator::next() { return impl_->next(); }
 void Simulator::rewind() { impl_->rewind(); }
+void Simulator::restart(const MotionScript& object_motion, const SensorControls& controls,
+                        std::uint64_t seed) {
+  impl_->restart(object_motion, controls, seed);
+}
 void Simulator::setControls(const SensorControls& controls) { impl_->setControls(controls); }
 const SensorControls& Simulator::controls() const { return impl_->controls(); }
 const Scene& Simulator::scene() const { return impl_->scene(); }

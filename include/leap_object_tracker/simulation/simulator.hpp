@@ -40,6 +40,13 @@ class Simulator {
   /// Starts again at the first frame; stamps go on.
   void rewind();
 
+  /// Starts again at the first frame, with the object moving otherwise; stamps go on. Cheaper than
+  /// a new Simulator: bodies that rest are not rendered anew. Frames then depend on nothing that
+  /// was before but, within the noise, on the rays that the resting bodies were seen by.
+  /// @param seed of all randomness but the sensor's fixed noise
+  void restart(const MotionScript& object_motion, const SensorControls& controls,
+               std::uint64_t seed);
+
   /// In force from the next frame on; to be used with auto exposure off.
   void setControls(const SensorControls& controls);
   const SensorControls& controls() const;

@@ -193,6 +193,29 @@ TEST(Simulator, goesOnInTimeAfterRewind) {
   EXPECT_GT(again->raw.stamp, last);
 }
 
+TEST(Simulator, restartsAsIfItHadBeenMadeWithTheOtherMotion) {
+  Scene scene = plateScene("640x240");
+  scene.sensor.read_noise = 1;
+  place(scene, {0, 0, 0.1});
+  Simulator simulator(scene);
+  simulator.next();
+  MotionScript elsewhere;
+  elsewhere.rest.translation() = Eigen::Vector3d(0.03, 0.01, 0.12);
+  SensorControls controls = scene.controls;
+  controls.exposure_us = 400;
+  simulator.restart(elsewhere, controls, 9);
+  const auto restarted = simulator.next();
+  EXPECT_TRUE(restarted->camera_from_object.isApprox(elsewhere.rest));
+  EXPECT_EQ(restarted->controls.exposure_us, 400);
+
+  scene.seed = 9;
+  scene.controls = controls;
+  scene.bodies.front().motion = elsewhere;
+  const auto made = Simulator(scene).next();
+  EXPECT_EQ(cv::norm(restarted->raw.left, made->raw.left, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(restarted->raw.right, made->raw.right, cv::NORM_INF), 0);
+}
+
 TEST(Simulator, takesFramesAsUnevenlyAsTheThesis) {
   Scene scene = plateScene("640x120");
   place(scene, {0, 0, -1});
