@@ -36,6 +36,7 @@ format: stamp tx ty tz qx qy qz qw, the object in the left rectified optical fra
   --method NAME           contour | feature: instead of the key 'measurement'
   --eyes NAME             both | left | right
   --particles N, --threads N, --seed N
+  --every N               takes only the first of every N pairs: motion N times as fast
   --fixed-frame FRAME     frame that the object rests or moves in, if the bag's tf knows the camera
   --timing FILE.csv       stamp, state and milliseconds of every pair
   --errors FILE.csv       errors of every frame that has a true pose
@@ -46,12 +47,13 @@ format: stamp tx ty tz qx qy qz qw, the object in the left rectified optical fra
 )";
 
 const std::map<std::string, int> kOptions{
-    {"object", 1},        {"out", 1},         {"config", 1},      {"rectify", 1},
-    {"start", 1},         {"perturb", 2},     {"method", 1},      {"eyes", 1},
-    {"particles", 1},     {"threads", 1},     {"seed", 1},        {"fixed-frame", 1},
-    {"timing", 1},        {"errors", 1},      {"covariances", 1}, {"overlay", 1},
-    {"overlay-every", 1}, {"left-image", 1},  {"right-image", 1}, {"left-info", 1},
-    {"right-info", 1},    {"calibration", 1}, {"truth", 1},       {"help", 0}};
+    {"object", 1},      {"out", 1},           {"config", 1},      {"rectify", 1},
+    {"start", 1},       {"perturb", 2},       {"method", 1},      {"eyes", 1},
+    {"every", 1},       {"particles", 1},     {"threads", 1},     {"seed", 1},
+    {"fixed-frame", 1}, {"timing", 1},        {"errors", 1},      {"covariances", 1},
+    {"overlay", 1},     {"overlay-every", 1}, {"left-image", 1},  {"right-image", 1},
+    {"left-info", 1},   {"right-info", 1},    {"calibration", 1}, {"truth", 1},
+    {"help", 0}};
 
 using Clock = std::chrono::steady_clock;
 
@@ -151,6 +153,7 @@ class BagTracking {
       timing_ << "stamp,state,rectification_ms,edges_ms,filter_ms,total_ms\n" << std::fixed;
     }
     if (line.has("overlay")) std::filesystem::create_directories(line.text("overlay"));
+    if (line.has("every")) every_ = static_cast<std::size_t>(line.wholeNumber("every", 1, 1000000));
     if (line.has("overlay-every"))
       overlay_every_ = static_cast<std::size_t>(line.wholeNumber("overlay-every", 1, 1000000));
     openForWriting(line.text("out"));  // fails now, not after the work
@@ -193,6 +196,7 @@ class BagTracking {
 
   void track(const RawStereoFrame& raw) {
     using namespace std::chrono_literals;
+    if (pairs_++ % every_ != 0) return;
     if (!frames_.empty() && raw.stamp <= frames_.back()) ++backwards_;
     if (start_ && (!start_->stamp || *start_->stamp <= raw.stamp + 1ms)) {
       tracker_.start(start_->camera_from_object);
@@ -300,6 +304,8 @@ class BagTracking {
   std::unique_ptr<tf2::BufferCore> transforms_;
   std::ofstream timing_;
   std::size_t overlay_every_ = 10;
+  std::size_t every_ = 1;
+  std::size_t pairs_ = 0;
   std::vector<Stamp> frames_;
   std::vector<double> total_ms_;
   Trajectory poses_;
