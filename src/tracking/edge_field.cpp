@@ -55,7 +55,8 @@ void EdgeField::build(const cv::Mat& image, const cv::Rect& region) {
     region_ = cv::Rect();
     return;
   }
-  const cv::Mat view = image(region_);
+  image_ = image(region_);
+  const cv::Mat& view = image_;
   view.convertTo(padded_, CV_16SC1, 16.0);
   cv::GaussianBlur(padded_, smooth_, cv::Size(5, 5), kSmoothing, kSmoothing);
 

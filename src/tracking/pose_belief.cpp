@@ -57,6 +57,10 @@ void PoseBelief::predict(const MotionParams& motion, double dt, const Pose& came
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
 }
 
+void PoseBelief::widen(const Matrix6d& pose_covariance) {
+  covariance.topLeftCorner<6, 6>() += pose_covariance;
+}
+
 void PoseBelief::update(const Pose& refined, const Matrix6d& image_information) {
   const Matrix6d known = poseCovariance();
   const Twist shift = cameraTwistBetween(pose, refined);

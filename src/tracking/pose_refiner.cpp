@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "leap_object_tracker/tracking/edge_profile.hpp"
+
 namespace leap_object_tracker {
 namespace {
 
@@ -12,6 +14,11 @@ constexpr double kSupportDistance = 1.5;  // [px]
 constexpr int kLongestRange = 24;         // [px]
 constexpr float kClearance = 16;          // [px] lines farther apart do not disturb each other
 constexpr float kAlongside = 4;           // [px]
+constexpr double kFine = 2.6;             // [px] ranges below this are searched by fitted steps
+constexpr int kProfile = 7;               // [px] half length of a profile that steps are fitted to
+constexpr double kLargestShift = 2;       // [px] of a fitted step
+constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rectified image
+constexpr float kSameLine = 0.7F;               // [px]
 // [px] by how much the rounding and the gloss of an edge between two visible faces may move its
 // image.
 constexpr double kCreaseDoubt = 1.2;
@@ -20,10 +27,12 @@ constexpr double kCreaseDoubt = 1.2;
 constexpr double kIndependentErrors = 0.4;
 
 /// Grey values of a field at sub-pixel places of the whole image.
+template <class Value>
 class Sampler {
  public:
-  explicit Sampler(const EdgeField& field)
-      : image_(field.smooth()),
+  Sampler(const EdgeField& field, const cv::Mat& image, float scale)
+      : image_(image),
+        scale_(scale),
         u0_(static_cast<float>(field.region().x)),
         v0_(static_cast<float>(field.region().y)),
         last_u_(static_cast<float>(image_.cols - 1)),
@@ -38,16 +47,17 @@ class Sampler {
     const float x = u - u0_, y = v - v0_;
     const int column = static_cast<int>(x), row = static_cast<int>(y);
     const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
-    const auto* top = image_.ptr<std::int16_t>(row) + column;
-    const auto* bottom = image_.ptr<std::int16_t>(row + 1) + column;
+    const auto* top = image_.ptr<Value>(row) + column;
+    const auto* bottom = image_.ptr<Value>(row + 1) + column;
     const float upper = static_cast<float>(top[0]) + fx * static_cast<float>(top[1] - top[0]);
     const float lower =
         static_cast<float>(bottom[0]) + fx * static_cast<float>(bottom[1] - bottom[0]);
-    return (upper + fy * (lower - upper)) * (1 / 16.0F);
+    return (upper + fy * (lower - upper)) * scale_;
   }
 
  private:
   const cv::Mat& image_;
+  float scale_;
   float u0_, v0_, last_u_, last_v_;
 };
 
@@ -87,9 +97,12 @@ struct PoseRefiner::Match {
   double length = 0;              ///< [px]
   Eigen::Vector2f place, normal;  ///< [px], unit vector in the image
   float clearance = 0;            ///< [px] to the next line of the contour beside this one
+  float before = -kClearance;     ///< [px] where the next line against the normal is crossed
+  float after = kClearance;       ///< [px] the same along the normal
   int eye = 0;
   bool found = false;
   bool outline = false;
+  bool limb = false;
   bool bright_inside = false;
 };
 
@@ -104,17 +117,21 @@ void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches)
   for (std::size_t i = first; i < matches.size(); i += 2) {
     const float u = matches[i].place.x(), v = matches[i].place.y();
     const float nu = matches[i].normal.x(), nv = matches[i].normal.y();
-    float clearance = kClearance;
+    float before = -kClearance, after = kClearance;
     for (const auto& line : lines) {
       const float du = line[0] - u, dv = line[1] - v;
-      const float across = std::abs(nu * du + nv * dv);
-      const bool beside = (across > 0.7F) & (std::abs(nu * dv - nv * du) < kAlongside) &
+      const float across = nu * du + nv * dv;
+      const bool beside = (std::abs(nu * dv - nv * du) < kAlongside) &
                           (std::abs(nu * line[2] + nv * line[3]) > 0.8F);
-      clearance = beside && across < clearance ? across : clearance;
+      before = beside && across < -kSameLine && across > before ? across : before;
+      after = beside && across > kSameLine && across < after ? across : after;
     }
-    matches[i].clearance = clearance;
     // Neighbours along the contour share it.
-    if (i + 1 < matches.size()) matches[i + 1].clearance = clearance;
+    for (std::size_t k = i; k < std::min(i + 2, matches.size()); ++k) {
+      matches[k].before = before;
+      matches[k].after = after;
+      matches[k].clearance = std::min(-before, after);
+    }
   }
 }
 
@@ -123,7 +140,7 @@ PoseRefiner::PoseRefiner(const ContourParams& params, const RectifiedStereoCamer
 
 void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                         const Pose& pose, const std::array<ContourView, 2>* exact, double range,
-                        double bright_inside, std::vector<Match>& matches,
+                        double bright_inside, bool fine, std::vector<Match>& matches,
                         std::array<EyeSupport, 2>& eyes) const {
   matches.clear();
   const double focal = camera_.focal_length;
@@ -132,7 +149,8 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
     const EdgeField& field = fields[static_cast<std::size_t>(eye)];
     eyes[static_cast<std::size_t>(eye)] = {};
     if (!field.seen()) continue;
-    const Sampler sample(field);
+    const Sampler<std::int16_t> sample(field, field.smooth(), 1 / 16.0F);
+    const Sampler<std::uint8_t> raw(field, field.image(), 1.0F);
     const Eigen::Vector3d eye_place(eye == 0 ? 0 : camera_.baseline, 0, 0);
     const Eigen::Vector3d origin = pose.translation() - eye_place;
     ViewChoice choice;
@@ -167,6 +185,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       match.eye = eye;
       match.length = stretch * point.length;
       match.outline = point.outline();
+      match.limb = point.limb > 0;
       if (match.outline) {
         const Eigen::Vector3d out = rotation * point.outward.cast<double>();
         if (normal.dot(Eigen::Vector2d(out.x() - x * out.z(), out.y() - y * out.z())) < 0)
@@ -252,12 +271,38 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           }
         }
       }
+      if (fine && match.found && !match.limb) fit(raw, match);
       auto& support = eyes[static_cast<std::size_t>(eye)];
       support.visible += match.length;
       if (match.found && std::abs(match.offset) < kSupportDistance)
         support.supported += match.length;
     }
   }
+}
+
+/// Replaces the place of the steepest slope by that of a fitted step.
+template <class Image>
+void PoseRefiner::fit(const Image& image, Match& match) const {
+  const float fu = match.place.x(), fv = match.place.y();
+  const float nu = match.normal.x(), nv = match.normal.y();
+  const auto inside = [&](int k) {
+    return image.contains(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
+  };
+  int first = 0, last = 0;
+  while (first > -kProfile && inside(first - 1)) --first;
+  while (last < kProfile && inside(last + 1)) ++last;
+  if (!inside(0)) return;
+  std::array<float, 2 * kProfile + 1> grey;
+  for (int k = first; k <= last; ++k)
+    grey[static_cast<std::size_t>(k - first)] =
+        image(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
+  const double blur = std::sqrt(std::pow(kBlurU * nu, 2) + std::pow(kBlurV * nv, 2));
+  const auto edge =
+      fitProfile(grey.data(), first, last - first + 1, blur,
+                 {static_cast<double>(match.before), static_cast<double>(match.after)});
+  if (!edge || std::abs(edge->offset) > kLargestShift) return;
+  match.offset = edge->offset;
+  match.variance = params_.edge_sigma * params_.edge_sigma + edge->variance;
 }
 
 RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
@@ -281,7 +326,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   };
 
   for (const double range : ranges) {
-    match(model, fields, pose, exact, range, bright_inside, matches, result.eyes);
+    match(model, fields, pose, exact, range, bright_inside, range < kFine, matches, result.eyes);
     const double deviation = robustScale(range);
     const double limit = std::min(range + 1, 4.685 * std::max(deviation, params_.edge_sigma));
     // Edges that lie farther off than their noise says share a wrong pose, not wrong edges.
@@ -308,7 +353,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   }
 
   const double last_range = 2.5;
-  match(model, fields, pose, exact, last_range, bright_inside, matches, result.eyes);
+  match(model, fields, pose, exact, last_range, bright_inside, true, matches, result.eyes);
   const double deviation = robustScale(last_range);
   result.residual = deviation;
   double bright = 0, judged = 0;

@@ -24,9 +24,12 @@ double millisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-constexpr double kLongestStep = 0.25;        // [s] longer gaps count as this long
-constexpr int kHypotheses = 4;               // refined a frame
-constexpr double kLeastSupport = 0.40;       // share of the contour to stand by a pose
+constexpr double kLongestStep = 0.25;   // [s] longer gaps count as this long
+constexpr int kHypotheses = 4;          // refined a frame
+constexpr double kDoubtShare = 0.3;     // of the particles, drawn as if the last pose were wrong
+constexpr double kDoubtReach = 4;       // [px] by which it then lies off
+constexpr double kDoubtCost = 5;        // [nats] against a pose that says so
+constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
 constexpr double kExact = 0.5;               // [px]
 constexpr int kPatience = 3;                 // frames below it before the object counts as lost
@@ -128,6 +131,8 @@ class Tracker::Impl {
     report_.edges_ms = millisecondsSince(started);
 
     started = Clock::now();
+    filter_.inject(kDoubtShare, belief_.pose, belief_.poseCovariance() + doubt(belief_.pose),
+                   belief_.velocity, belief_.velocityCovariance());
     scoreParticles();
     const RefinedPose refined = refineBest();
     takeOver(refined);
@@ -215,6 +220,17 @@ class Tracker::Impl {
     return regions;
   }
 
+  /// Covariance of a pose that fits the image only nearly: a few pixels in every direction.
+  Matrix6d doubt(const Pose& pose) const {
+    const double depth = std::max(0.03, pose.translation().z());
+    const double reach = kDoubtReach * depth / camera_.focal_length;  // [m]
+    const double turn = std::min(0.2, reach / model_.radius());
+    const double along = std::min(0.1 * depth, reach * depth / model_.radius());
+    Twist deviation;
+    deviation << reach, reach, along, turn, turn, turn;
+    return deviation.cwiseAbs2().asDiagonal();
+  }
+
   void scoreParticles() {
     using Sharpness = ContourMeasurement::Sharpness;
     const auto scorer = [&](Sharpness sharpness) {
@@ -237,8 +253,13 @@ class Tracker::Impl {
   /// Refines the prediction and the best particles that differ from each other; the one that
   /// explains image and prediction best wins.
   RefinedPose refineBest() {
-    const Matrix6d prior_information = belief_.poseCovariance().inverse();
-    const PosePrior prior{belief_.pose, prior_information};
+    const PosePrior prior{belief_.pose, belief_.poseCovariance().inverse()};
+    const PosePrior doubted{belief_.pose,
+                            (belief_.poseCovariance() + doubt(belief_.pose)).inverse()};
+    const auto surprise = [](const PosePrior& expected, const Pose& pose) {
+      const Twist shift = cameraTwistBetween(expected.mean, pose);
+      return 0.5 * shift.dot(expected.information * shift);
+    };
     std::vector<Pose> starts{belief_.pose};
     const auto& scores = filter_.logLikelihoods();
     std::vector<std::uint32_t> order(scores.size());
@@ -260,8 +281,9 @@ class Tracker::Impl {
     // The prediction first; particles that would only lead to the same place are left out.
     std::vector<RefinedPose> refined(starts.size());
     const auto refine = [&](std::size_t i) {
+      const bool expected = surprise(prior, starts[i]) < kDoubtCost + surprise(doubted, starts[i]);
       refined[i] = refiner_.refine(
-          model_, measurement_.fields(), starts[i], prior, bright_inside_,
+          model_, measurement_.fields(), starts[i], expected ? prior : doubted, bright_inside_,
           i == 0 && !fresh_ ? std::vector<double>{6, 4, 2.5} : std::vector<double>{8, 5, 3, 2.5});
     };
     refine(0);
@@ -281,13 +303,17 @@ class Tracker::Impl {
     tbb::parallel_for(std::size_t{1}, starts.size(), refine);
 
     const auto score = [&](const RefinedPose& candidate) {
-      const Twist shift = cameraTwistBetween(belief_.pose, candidate.camera_from_object);
-      return candidate.log_likelihood - 0.5 * shift.dot(prior_information * shift);
+      return candidate.log_likelihood -
+             std::min(surprise(prior, candidate.camera_from_object),
+                      kDoubtCost + surprise(doubted, candidate.camera_from_object));
     };
     RefinedPose best = refined[0];
     for (const RefinedPose& candidate : refined)
       if (score(candidate) > score(best)) best = candidate;
-    polish(best, prior);
+    const bool expected = surprise(prior, best.camera_from_object) <
+                          kDoubtCost + surprise(doubted, best.camera_from_object);
+    if (!expected) belief_.widen(doubt(belief_.pose));
+    polish(best, expected ? prior : doubted);
     return best;
   }
 

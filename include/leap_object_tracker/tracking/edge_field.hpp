@@ -52,6 +52,8 @@ class EdgeField {
   const cv::Rect& region() const { return region_; }
   const cv::Size& imageSize() const { return image_size_; }
 
+  /// Grey values of the region as they came (CV_8UC1).
+  const cv::Mat& image() const { return image_; }
   /// Smoothed grey values of the region, 16 times the 8-bit scale (CV_16SC1).
   const cv::Mat& smooth() const { return smooth_; }
   /// Canny edges of the region: 255 on edges (CV_8UC1).
@@ -69,7 +71,7 @@ class EdgeField {
  private:
   cv::Rect region_;
   cv::Size image_size_;
-  cv::Mat padded_, smooth_, stabilized_, du_, dv_, edges_;
+  cv::Mat image_, padded_, smooth_, stabilized_, du_, dv_, edges_;
   std::vector<Edgel> edgels_;
   float gradient_noise_ = 0;
 };

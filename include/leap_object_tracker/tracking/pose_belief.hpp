@@ -22,6 +22,9 @@ struct PoseBelief {
   /// constant over the step, as the particles move.
   void predict(const MotionParams& motion, double dt, const Pose& camera_motion);
 
+  /// Adds an error of the pose that has nothing to do with the velocity.
+  void widen(const Matrix6d& pose_covariance);
+
   /// Takes the pose that maximises the posterior of image and prediction, and the information that
   /// the image alone gave. The velocity follows through its correlation with the pose.
   void update(const Pose& refined, const Matrix6d& image_information);

@@ -62,8 +62,10 @@ class PoseRefiner {
   struct Match;
   static void findClearances(std::size_t first, std::vector<Match>& matches);
   void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
-             const std::array<ContourView, 2>* exact, double range, double bright_inside,
+             const std::array<ContourView, 2>* exact, double range, double bright_inside, bool fine,
              std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const;
+  template <class Image>
+  void fit(const Image& image, Match& match) const;
 
   ContourParams params_;
   RectifiedStereoCamera camera_;

@@ -28,7 +28,7 @@ struct ContourParams {
   double truncation = 8.0;      ///< [px] edges farther away count as no edge
   double outlier_share = 0.3;   ///< prior share of contour points that no edge supports
   double edge_sigma = 0.4;      ///< [px] noise of one sub-pixel edge
-  double edge_radius = 0.0004;  ///< [m] rounding of the edges of a primitive: no body is sharp
+  double edge_radius = 0.0002;  ///< [m] rounding of the edges of a primitive: no body is sharp
   /// [px] by which the limb of a curved body, lit from beside the camera, shows inside of its true
   /// place: brightness falls to zero there with the square root of the distance, and the steepest
   /// place of that, smoothed by a Gaussian, lies 0.77 of its deviation inside.
