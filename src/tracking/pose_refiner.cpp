@@ -14,6 +14,10 @@ constexpr double kSupportDistance = 1.5;  // [px]
 constexpr int kLongestRange = 24;         // [px]
 constexpr float kClearance = 16;          // [px] lines farther apart do not disturb each other
 constexpr float kAlongside = 4;           // [px]
+constexpr int kRegionReach = 5;           // [px] on either side of an outline that is looked at
+constexpr float kRegionPull = 1.0F;       // of the region on the choice between edges
+constexpr double kRegionWeight = 1.0;     // [px] beside an outline that speak independently
+constexpr double kLearningRate = 0.1;     // a frame
 constexpr double kFine = 2.6;             // [px] ranges below this are searched by fitted steps
 constexpr int kProfile = 7;               // [px] half length of a profile that steps are fitted to
 constexpr double kLargestShift = 2;       // [px] of a fitted step
@@ -104,6 +108,7 @@ struct PoseRefiner::Match {
   bool outline = false;
   bool limb = false;
   bool bright_inside = false;
+  float region = 0;  ///< [nats/px] by which the grey values speak for an outline here
 };
 
 /// How far another line of the contour runs beside each: an edge between the two belongs to the
@@ -140,11 +145,12 @@ PoseRefiner::PoseRefiner(const ContourParams& params, const RectifiedStereoCamer
 
 void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                         const Pose& pose, const std::array<ContourView, 2>* exact, double range,
-                        double bright_inside, bool fine, std::vector<Match>& matches,
+                        const Appearance& appearance, bool fine, std::vector<Match>& matches,
                         std::array<EyeSupport, 2>& eyes) const {
   matches.clear();
   const double focal = camera_.focal_length;
-  std::array<float, 2 * kLongestRange + 5> profile{};
+  std::array<float, 2 * (kLongestRange + kRegionReach) + 5> profile{};
+  std::array<float, 2 * (kLongestRange + kRegionReach) + 6> ratios{};
   for (int eye = 0; eye < 2; ++eye) {
     const EdgeField& field = fields[static_cast<std::size_t>(eye)];
     eyes[static_cast<std::size_t>(eye)] = {};
@@ -214,7 +220,9 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       const int reach = std::min(kLongestRange, static_cast<int>(std::ceil(own_range)));
 
       // Grey values along the normal; the part inside the region only.
-      int low = -reach - 2, high = reach + 2;
+      const bool region = match.outline && appearance.grey.known();
+      const int span = reach + (region ? kRegionReach : 2);
+      int low = -span, high = span;
       const auto inside = [&](int k) {
         return sample.contains(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
       };
@@ -222,17 +230,36 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       while (high >= 0 && !inside(high)) --high;
       if (low <= -2 && high >= 2) {
         for (int k = low; k <= high; ++k)
-          profile[static_cast<std::size_t>(k + reach + 2)] =
+          profile[static_cast<std::size_t>(k + span)] =
               sample(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
         const auto slope = [&](int k) {
-          return 0.5F * (profile[static_cast<std::size_t>(k + reach + 3)] -
-                         profile[static_cast<std::size_t>(k + reach + 1)]);
+          return 0.5F * (profile[static_cast<std::size_t>(k + span + 1)] -
+                         profile[static_cast<std::size_t>(k + span - 1)]);
         };
+        // Grey values like the object's on the inner side and like the surroundings' on the outer.
+        if (region) {
+          ratios[static_cast<std::size_t>(low + span)] = 0;
+          for (int k = low; k <= high; ++k)
+            ratios[static_cast<std::size_t>(k + span + 1)] =
+                ratios[static_cast<std::size_t>(k + span)] +
+                appearance.grey.logRatio(profile[static_cast<std::size_t>(k + span)]);
+        }
+        const auto regionAt = [&](int k) {
+          const auto mean = [&](int from, int to) {  // of [from, to)
+            from = std::max(from, low), to = std::min(to, high + 1);
+            return from >= to ? 0.0F
+                              : (ratios[static_cast<std::size_t>(to + span)] -
+                                 ratios[static_cast<std::size_t>(from + span)]) /
+                                    static_cast<float>(to - from);
+          };
+          return 0.5F * (mean(k - kRegionReach, k - 1) - mean(k + 2, k + 1 + kRegionReach));
+        };
+        if (region) match.region = regionAt(0);
         float best = 0;
         // Lines closer than the blur of the image pull each other's edges.
         const double crowding = std::max(0.0, 0.25 * (4.0 - clearance));
         const float blur = static_cast<float>(std::max(1.0, 0.5 * own_range));
-        for (int k = low + 2; k <= high - 2; ++k) {
+        for (int k = std::max(low + 2, -reach); k <= std::min(high - 2, reach); ++k) {
           const float here = slope(k), size = std::abs(here);
           if (size < weakest) continue;
           const float before = slope(k - 1), after = slope(k + 1);
@@ -246,8 +273,11 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           // Towards the outside an outline darkens where the object is brighter than what is
           // behind.
           const bool brighter_inside = here < 0;
-          if (match.outline)
-            value *= static_cast<float>(brighter_inside ? bright_inside : 1 - bright_inside);
+          if (region)
+            value *= std::exp(kRegionPull * regionAt(k));
+          else if (match.outline)
+            value *= static_cast<float>(brighter_inside ? appearance.bright_inside
+                                                        : 1 - appearance.bright_inside);
           if (value <= best) continue;
           best = value;
           match.found = true;
@@ -306,8 +336,8 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
 }
 
 RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
-                                const Pose& start, const PosePrior& prior, double bright_inside,
-                                const std::vector<double>& ranges,
+                                const Pose& start, const PosePrior& prior,
+                                const Appearance& appearance, const std::vector<double>& ranges,
                                 const std::array<ContourView, 2>* exact) const {
   RefinedPose result;
   result.camera_from_object = start;
@@ -326,7 +356,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   };
 
   for (const double range : ranges) {
-    match(model, fields, pose, exact, range, bright_inside, range < kFine, matches, result.eyes);
+    match(model, fields, pose, exact, range, appearance, range < kFine, matches, result.eyes);
     const double deviation = robustScale(range);
     const double limit = std::min(range + 1, 4.685 * std::max(deviation, params_.edge_sigma));
     // Edges that lie farther off than their noise says share a wrong pose, not wrong edges.
@@ -353,7 +383,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   }
 
   const double last_range = 2.5;
-  match(model, fields, pose, exact, last_range, bright_inside, true, matches, result.eyes);
+  match(model, fields, pose, exact, last_range, appearance, true, matches, result.eyes);
   const double deviation = robustScale(last_range);
   result.residual = deviation;
   double bright = 0, judged = 0;
@@ -370,10 +400,39 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
       gain = 1 - 0.5 * std::pow(m.offset / 0.8, 2);
     }
     // Against chance: an edge within reach of an arbitrary place is seen about every third time.
+    result.log_likelihood += kRegionWeight * m.samples * m.region;
     result.log_likelihood += m.samples * std::max(gain, -1.0) + (m.found ? 0 : -m.samples);
   }
   result.bright_inside = judged > 0 ? bright / judged : 0.5;
   return result;
+}
+
+void PoseRefiner::learn(const ContourModel& model, const std::array<EdgeField, 2>& fields,
+                        const Pose& pose, Appearance& appearance) const {
+  thread_local std::vector<Match> matches;
+  std::array<EyeSupport, 2> eyes;
+  match(model, fields, pose, nullptr, 2.0, appearance, false, matches, eyes);
+  GreyModel::Histogram inside{}, outside{};
+  double bright = 0, judged = 0;
+  for (const Match& m : matches) {
+    if (!m.outline || !m.found || std::abs(m.offset) > kSupportDistance) continue;
+    judged += m.length;
+    if (m.bright_inside) bright += m.length;
+    const EdgeField& field = fields[static_cast<std::size_t>(m.eye)];
+    const Sampler<std::uint8_t> grey(field, field.image(), 1.0F);
+    for (int k = 2; k < 2 + kRegionReach; ++k)
+      for (const int side : {-1, 1}) {
+        const float u = m.place.x() + static_cast<float>(side * k) * m.normal.x();
+        const float v = m.place.y() + static_cast<float>(side * k) * m.normal.y();
+        if (!grey.contains(u, v)) continue;
+        (side < 0 ? inside : outside)[static_cast<std::size_t>(
+            GreyModel::bin(static_cast<std::uint8_t>(grey(u, v))))] += 1;
+      }
+  }
+  if (judged <= 0) return;
+  appearance.grey.learn(inside, outside, kLearningRate);
+  appearance.bright_inside = std::clamp(
+      appearance.bright_inside + 0.1 * (bright / judged - appearance.bright_inside), 0.2, 0.95);
 }
 
 }  // namespace leap_object_tracker

@@ -295,7 +295,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   }
   std::vector<RefinedPose> refined(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
-    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, 0.7, {10, 8, 6, 4, 3, 2.5});
+    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 8, 6, 4, 3, 2.5});
   });
   const auto best = std::max_element(refined.begin(), refined.end(),
                                      [](const RefinedPose& a, const RefinedPose& b) {

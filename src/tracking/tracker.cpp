@@ -31,6 +31,7 @@ constexpr double kDoubtReach = 4;       // [px] by which it then lies off
 constexpr double kDoubtCost = 5;        // [nats] against a pose that says so
 constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
+constexpr double kLearningSupport = 0.7;     // of a pose at which the object's looks are learned
 constexpr double kExact = 0.5;               // [px]
 constexpr int kPatience = 3;                 // frames below it before the object counts as lost
 constexpr double kFoundSupport = 0.6;        // share of the contour that a found pose must have
@@ -164,7 +165,8 @@ class Tracker::Impl {
     belief_ = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
     filter_.initialize(belief_.pose, belief_.poseCovariance(), belief_.velocity,
                        belief_.velocityCovariance());
-    bright_inside_ = std::clamp(found->bright_inside, 0.3, 0.9);
+    appearance_ = {};
+    appearance_.bright_inside = std::clamp(found->bright_inside, 0.3, 0.9);
     last_stamp_ = frame.stamp;
     weak_frames_ = 0;
     fresh_ = true;
@@ -283,7 +285,7 @@ class Tracker::Impl {
     const auto refine = [&](std::size_t i) {
       const bool expected = surprise(prior, starts[i]) < kDoubtCost + surprise(doubted, starts[i]);
       refined[i] = refiner_.refine(
-          model_, measurement_.fields(), starts[i], expected ? prior : doubted, bright_inside_,
+          model_, measurement_.fields(), starts[i], expected ? prior : doubted, appearance_,
           i == 0 && !fresh_ ? std::vector<double>{6, 4, 2.5} : std::vector<double>{8, 5, 3, 2.5});
     };
     refine(0);
@@ -328,7 +330,7 @@ class Tracker::Impl {
     if (!views[0] || !views[1]) return;
     const std::array<ContourView, 2> exact{*std::move(views[0]), *std::move(views[1])};
     refined = refiner_.refine(model_, measurement_.fields(), refined.camera_from_object, prior,
-                              bright_inside_, {3, 2.5}, &exact);
+                              appearance_, {3, 2.5}, &exact);
   }
 
   void takeOver(const RefinedPose& refined) {
@@ -343,7 +345,8 @@ class Tracker::Impl {
     }
     if (supported) {
       belief_.update(refined.camera_from_object, refined.information);
-      bright_inside_ = std::clamp(0.9 * bright_inside_ + 0.1 * refined.bright_inside, 0.2, 0.95);
+      if (report_.support > kLearningSupport)
+        refiner_.learn(model_, measurement_.fields(), belief_.pose, appearance_);
       weak_frames_ = 0;
       last_seen_ = belief_.pose;
       report_.state = TrackerState::kTracking;
@@ -366,7 +369,7 @@ class Tracker::Impl {
   PoseBelief belief_;
   std::optional<Stamp> last_stamp_;
   std::optional<Pose> last_fixed_from_camera_;
-  double bright_inside_ = 0.7;
+  Appearance appearance_;
   int weak_frames_ = 0;
   int frames_lost_ = 0;
   bool fresh_ = false;

@@ -7,6 +7,7 @@
 #include "leap_object_tracker/geometry/stereo_camera.hpp"
 #include "leap_object_tracker/tracking/contour_model.hpp"
 #include "leap_object_tracker/tracking/edge_field.hpp"
+#include "leap_object_tracker/tracking/grey_model.hpp"
 #include "leap_object_tracker/tracking/tracker_params.hpp"
 
 namespace leap_object_tracker {
@@ -54,16 +55,20 @@ class PoseRefiner {
   /// @param ranges [px] half length of the search of each iteration
   /// @param exact views of both eyes to use instead of the model's, from a place close by
   RefinedPose refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
-                     const Pose& start, const PosePrior& prior, double bright_inside,
+                     const Pose& start, const PosePrior& prior, const Appearance& appearance,
                      const std::vector<double>& ranges,
                      const std::array<ContourView, 2>* exact = nullptr) const;
+
+  /// Takes the looks of the object at a pose that can be trusted into `appearance`.
+  void learn(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
+             Appearance& appearance) const;
 
  private:
   struct Match;
   static void findClearances(std::size_t first, std::vector<Match>& matches);
   void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
-             const std::array<ContourView, 2>* exact, double range, double bright_inside, bool fine,
-             std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const;
+             const std::array<ContourView, 2>* exact, double range, const Appearance& appearance,
+             bool fine, std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const;
   template <class Image>
   void fit(const Image& image, Match& match) const;
 
