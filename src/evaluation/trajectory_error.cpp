@@ -371,14 +371,23 @@ TrajectoryReport compare(const Trajectory& estimate, const Trajectory& truth,
     for (const auto& pose : truth) stamps.push_back(pose.stamp);
   std::sort(stamps.begin(), stamps.end());
 
+  // Of the truth's object frame, so that the first estimate is right up to its own error.
+  std::optional<Eigen::Matrix3d> turn;
+  if (!params.absolute_orientation) turn = Eigen::Matrix3d::Identity();
+  const Symmetry symmetry = params.absolute_orientation ? Symmetry() : object.symmetry;
+
   TrajectoryReport report;
   for (const Stamp stamp : stamps) {
     const StampedPose* found = nearestInTime(estimate, stamp, params.stamp_tolerance);
     const Stamp when = found != nullptr ? found->stamp : stamp;
-    const auto true_pose =
+    auto true_pose =
         poseAt(truth, when, nanoseconds(params.stamp_tolerance), nanoseconds(params.longest_gap));
-    if (true_pose)
-      report.frames.push_back(judge(when, *true_pose, found, object.symmetry, surface, extreme));
+    if (!true_pose) continue;
+    if (!turn && found != nullptr)
+      turn = true_pose->linear().transpose() *
+             nearestEquivalent(*true_pose, found->camera_from_object, object.symmetry).linear();
+    if (turn) true_pose->linear() = true_pose->linear() * *turn;
+    report.frames.push_back(judge(when, *true_pose, found, symmetry, surface, extreme));
   }
   if (report.frames.empty())
     throw std::invalid_argument(
@@ -425,7 +434,7 @@ TrajectoryReport compare(const Trajectory& estimate, const Trajectory& truth,
   report.time_to_first_pose = timeOfFirst(frames, kAnything, kAnything);
   report.time_to_good_pose = timeOfFirst(frames, params.good_position, params.good_rotation);
   report.gaps = gapsOf(frames, params);
-  report.nees = neesReport(frames, object.symmetry);
+  report.nees = neesReport(frames, symmetry);
   return report;
 }
 

@@ -28,6 +28,7 @@ Judges poses of an object against the true ones: a bag with a topic of poses, or
   --covariances A.csv,...  one for each estimate, as track_bag writes them
   --timing A.csv,...       one for each estimate, as track_bag writes them: the frames that a pose
                            was due for (default: every stamp of the truth)
+  --absolute               turns that only texture shows count too, from the first pose on
   --csv FILE.csv           the figures, a line for each run
   --frames FILE.csv        the errors of each frame of the first run
   --html FILE.html         a report with plots that is one file
@@ -38,9 +39,9 @@ Judges poses of an object against the true ones: a bag with a topic of poses, or
 )";
 
 const std::map<std::string, int> kOptions{
-    {"object", 1},    {"topic", 1},    {"names", 1}, {"covariances", 1}, {"timing", 1},
-    {"csv", 1},       {"frames", 1},   {"html", 1},  {"title", 1},       {"series", 1},
-    {"histogram", 1}, {"pictures", 1}, {"help", 0}};
+    {"object", 1},    {"topic", 1},    {"names", 1},    {"covariances", 1}, {"timing", 1},
+    {"csv", 1},       {"frames", 1},   {"html", 1},     {"title", 1},       {"series", 1},
+    {"histogram", 1}, {"pictures", 1}, {"absolute", 0}, {"help", 0}};
 
 using Strings = std::vector<std::string>;
 
@@ -136,10 +137,11 @@ Runs readRuns(const CommandLine& line) {
 }
 
 TrajectoryReport judge(const Runs& runs, std::size_t i, const Trajectory& truth,
-                       const ObjectModel& object) {
+                       const ObjectModel& object, bool absolute) {
   Trajectory estimate = readTum(runs.estimates[i]);
   if (!runs.covariances.empty()) readCovariances(runs.covariances[i], estimate);
   EvaluationParams params;
+  params.absolute_orientation = absolute;
   if (!runs.timings.empty())
     for (const double stamp : runs.timings[i].column("stamp"))
       params.frames.push_back(stampFromSeconds(stamp));
@@ -177,7 +179,7 @@ int run(int argc, char** argv) {
   ReportContents contents;
   contents.names = runs.names;
   for (std::size_t i = 0; i < runs.estimates.size(); ++i) {
-    contents.runs.push_back(judge(runs, i, truth, object));
+    contents.runs.push_back(judge(runs, i, truth, object, line.has("absolute")));
     std::cout << (i == 0 ? "" : "\n") << runs.names[i] << '\n';
     writeText(std::cout, contents.runs.back());
   }

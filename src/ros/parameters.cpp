@@ -11,6 +11,12 @@ namespace {
 const std::vector<std::pair<std::string, Eyes>> kEyes{
     {"both", Eyes::kBoth}, {"left", Eyes::kLeft}, {"right", Eyes::kRight}};
 
+const std::vector<std::pair<std::string, Measurement>> kMeasurements{
+    {"auto", Measurement::kAuto},
+    {"contour", Measurement::kContour},
+    {"feature", Measurement::kFeature},
+    {"both", Measurement::kBoth}};
+
 std::string printed(double value) {
   std::ostringstream text;
   text << value;
@@ -136,7 +142,7 @@ TrackerNodeParams readTrackerNodeParams(ParameterReader& reader) {
   reader.read("tf_patience", params.tf_patience, {0, 1});
   reader.read("overlay_rate", params.overlay_rate, {0, 1000});
   reader.read("shown_particles", params.shown_particles, {0, 100000});
-  reader.read("measurement", tracker.measurement);
+  reader.read<Measurement>("measurement", tracker.measurement, kMeasurements);
   reader.read<Eyes>("eyes", tracker.eyes, kEyes);
   reader.read("threads", tracker.threads, {1, 256});
   reader.section("motion", [&](ParameterReader& r) {
@@ -163,6 +169,23 @@ TrackerNodeParams readTrackerNodeParams(ParameterReader& reader) {
     std::string cache = "auto";
     r.read("cache_folder", cache);
     p.cache_folder = cache == "auto" ? usersCacheFolder() : cache;
+  });
+  reader.section("feature", [&](ParameterReader& r) {
+    FeatureParams& p = tracker.feature;
+    r.read("corners", p.corners, {8, 4096});
+    r.read("resolution", p.resolution, {100, 100000});
+    r.read("least_contrast", p.least_contrast, {0, 1});
+    r.read("ratio", p.ratio, {0, 1});
+    r.read("epipolar_distance", p.epipolar_distance, {0, 100});
+    r.read("disparity_sigma", p.disparity_sigma, {0.01, 10});
+    r.read("corner_sigma", p.corner_sigma, {0.01, 10});
+    r.read("model_sigma", p.model_sigma, {0, 0.1});
+    r.read("outlier_share", p.outlier_share, {0.001, 0.99});
+    r.read("independent_share", p.independent_share, {0.001, 1});
+    r.read("landmarks", p.landmarks, {0, 100000});
+    r.read("map_position_sigma", p.map_position_sigma, {0, 1});
+    r.read("map_rotation_sigma_deg", p.map_rotation_sigma_deg, {0, 180});
+    r.read("map_file", p.map_file);
   });
   reader.section("volume", [&](ParameterReader& r) {
     VolumeParams& p = tracker.volume;

@@ -96,6 +96,7 @@ class ParticleTable {
 
   static TrackerParams readParams(const CommandLine& line) {
     TrackerParams params;
+    params.measurement = Measurement::kContour;
     params.filter.particles = 100000;
     if (line.has("particles"))
       params.filter.particles = static_cast<int>(line.wholeNumber("particles", 1, 10000000));

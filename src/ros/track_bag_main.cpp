@@ -33,7 +33,9 @@ format: stamp tx ty tz qx qy qz qw, the object in the left rectified optical fra
   --rectify FILE.yaml     parameters of the rectification (config/rectify.yaml)
   --start HOW             search (default) | truth | "x y z qx qy qz qw"
   --perturb MM DEG        moves and turns the start pose by as much, in a random direction
-  --method NAME           contour | feature: instead of the key 'measurement'
+  --method NAME           auto | contour | feature | both: instead of the key 'measurement'
+  --map FILE.yaml         landmarks of the object to begin with
+  --save-map FILE.yaml    the landmarks known at the end
   --eyes NAME             both | left | right
   --particles N, --threads N, --seed N
   --every N               takes only the first of every N pairs: motion N times as fast
@@ -53,7 +55,7 @@ const std::map<std::string, int> kOptions{
     {"fixed-frame", 1}, {"timing", 1},        {"errors", 1},      {"covariances", 1},
     {"overlay", 1},     {"overlay-every", 1}, {"left-image", 1},  {"right-image", 1},
     {"left-info", 1},   {"right-info", 1},    {"calibration", 1}, {"truth", 1},
-    {"help", 0}};
+    {"map", 1},         {"save-map", 1},      {"help", 0}};
 
 using Clock = std::chrono::steady_clock;
 
@@ -71,7 +73,8 @@ TrackerParams readParams(const CommandLine& line) {
   ParameterReader reader(line.has("config") ? loadYamlFile(line.text("config")) : YAML::Node(),
                          "file '" + line.text("config") + "'");
   TrackerParams params = readTrackerNodeParams(reader).tracker;
-  if (line.has("method")) params.measurement = line.text("method");
+  if (line.has("method")) params.measurement = measurementFromWord(line.text("method"));
+  if (line.has("map")) params.feature.map_file = line.text("map");
   if (line.has("eyes")) params.eyes = eyesFromWord(line.text("eyes"));
   if (line.has("particles"))
     params.filter.particles = static_cast<int>(line.wholeNumber("particles", 1, 10000000));
@@ -171,6 +174,7 @@ class BagTracking {
     if (transforms_ && no_transform_ > 0)
       warn("no transform from " + bag_.cameraFrame() + " to " + line_.text("fixed-frame") +
            " for " + std::to_string(no_transform_) + " frames: the camera was taken to be at rest");
+    if (line_.has("save-map")) tracker_.saveLandmarks(line_.text("save-map"));
     writeResults();
   }
 

@@ -25,4 +25,13 @@ Eyes eyesFromWord(const std::string& word) {
   throw std::invalid_argument("eyes '" + word + "': expected both, left or right");
 }
 
+Measurement measurementFromWord(const std::string& word) {
+  if (word == "auto") return Measurement::kAuto;
+  if (word == "contour") return Measurement::kContour;
+  if (word == "feature") return Measurement::kFeature;
+  if (word == "both") return Measurement::kBoth;
+  throw std::invalid_argument("measurement '" + word +
+                              "': expected auto, contour, feature or both");
+}
+
 }  // namespace leap_object_tracker

@@ -25,24 +25,48 @@ constexpr int kPatchSearch = 3;  // [scaled px] to both sides
 constexpr double kLeastCorrelation = 0.70;
 constexpr double kSurfThreshold = 30;  // of dlib's determinant of the Hessian, its own default
 
-using IntegralImage = dlib::integral_image_generic<int>;
+/// What dlib's SURF descriptor reads of an image at the smallest scale: responses of Haar wavelets
+/// two pixels wide, straight from the pixels.
+struct HaarImage {
+  const cv::Mat& image;
+};
 
-void integrate(const cv::Mat& image, IntegralImage& integral) {
-  dlib::array2d<unsigned char> copy(image.rows, image.cols);
-  for (int row = 0; row < image.rows; ++row)
-    for (int column = 0; column < image.cols; ++column)
-      copy[row][column] = image.at<unsigned char>(row, column);
-  integral.load(copy);
+int haar_x(const HaarImage& haar, const dlib::point& place, long /*width*/) {
+  const unsigned char* above = haar.image.ptr<unsigned char>(static_cast<int>(place.y()) - 1);
+  const unsigned char* here = above + haar.image.step;
+  const long x = place.x();
+  return above[x] + here[x] - above[x - 1] - here[x - 1];
 }
 
-FeatureDescriptor describe(const IntegralImage& integral, const cv::Point& place, double roll) {
+int haar_y(const HaarImage& haar, const dlib::point& place, long /*width*/) {
+  const unsigned char* above = haar.image.ptr<unsigned char>(static_cast<int>(place.y()) - 1);
+  const unsigned char* here = above + haar.image.step;
+  const long x = place.x();
+  return here[x - 1] + here[x] - above[x - 1] - above[x];
+}
+
+FeatureDescriptor describe(const cv::Mat& image, const cv::Point& place, double roll) {
   dlib::matrix<double, 64, 1> values;
-  dlib::compute_surf_descriptor(integral, dlib::vector<double, 2>(place.x, place.y), 1.0, roll,
-                                values);
+  dlib::compute_surf_descriptor(HaarImage{image}, dlib::vector<double, 2>(place.x, place.y), 1.0,
+                                roll, values);
   FeatureDescriptor descriptor;
   for (long i = 0; i < 64; ++i)
     descriptor[static_cast<std::size_t>(i)] = static_cast<float>(values(i));
   return descriptor;
+}
+
+std::vector<dlib::interest_point> surfPoints(const cv::Mat& image) {
+  dlib::array2d<unsigned char> copy(image.rows, image.cols);
+  for (int row = 0; row < image.rows; ++row)
+    for (int column = 0; column < image.cols; ++column)
+      copy[row][column] = image.at<unsigned char>(row, column);
+  dlib::integral_image_generic<int> integral;
+  integral.load(copy);
+  dlib::hessian_pyramid pyramid;
+  pyramid.build_pyramid(integral, 4, 6, 2);
+  std::vector<dlib::interest_point> points;
+  dlib::get_interest_points(pyramid, kSurfThreshold, points);
+  return points;
 }
 
 /// Between the darkest and the brightest twentieth [grey levels].
@@ -175,16 +199,11 @@ void FeatureExtractor::prepare(const cv::Mat& image, const cv::Rect& region, dou
   cv::warpAffine(image, eye.scaled, image_from_scaled, size,
                  cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
 
-  if (detector_ == CornerDetector::kFast) findFast(eye);
-  IntegralImage integral;
-  integrate(eye.scaled, integral);
-  if (detector_ == CornerDetector::kSurf) {
-    dlib::hessian_pyramid pyramid;
-    pyramid.build_pyramid(integral, 4, 6, 2);
-    std::vector<dlib::interest_point> points;
-    dlib::get_interest_points(pyramid, kSurfThreshold, points);
+  if (detector_ == CornerDetector::kFast) {
+    findFast(eye);
+  } else {
     const cv::Rect inside(kMargin, kMargin, size.width - 2 * kMargin, size.height - 2 * kMargin);
-    for (const auto& point : points) {
+    for (const auto& point : surfPoints(eye.scaled)) {
       const cv::Point place(static_cast<int>(std::lround(point.center.x())),
                             static_cast<int>(std::lround(point.center.y())));
       if (inside.contains(place))
@@ -192,7 +211,7 @@ void FeatureExtractor::prepare(const cv::Mat& image, const cv::Rect& region, dou
     }
   }
   tbb::parallel_for(std::size_t{0}, eye.corners.size(), [&](std::size_t i) {
-    eye.corners[i].descriptor = describe(integral, eye.corners[i].place, roll);
+    eye.corners[i].descriptor = describe(eye.scaled, eye.corners[i].place, roll);
   });
 }
 

@@ -1,8 +1,5 @@
 #include "leap_object_tracker/tracking/feature_measurement.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -17,8 +14,32 @@ constexpr int kIterations = 10;             // of Gauss-Newton, at most
 constexpr double kStill = 1e-5;             // [m] a smaller step is the last
 constexpr double kTrusted = 0.5;            // probability that a feature belongs to the object
 
-/// log(1 + exp(x)) without overflow.
-float softplus(float x) { return x > 15 ? x : x < -15 ? 0 : std::log1p(std::exp(x)); }
+/// log(1 + exp(-x)) for x from 0 on, between nodes of a table; zero beyond it.
+class SoftplusTail {
+ public:
+  SoftplusTail() {
+    for (std::size_t i = 0; i < nodes_.size(); ++i)
+      nodes_[i] = std::log1p(std::exp(-static_cast<float>(i) / kNodesPerUnit));
+    nodes_.back() = 0;
+  }
+  float operator()(float x) const {
+    const float place = std::min(x * kNodesPerUnit, static_cast<float>(nodes_.size()) - 1.5F);
+    const auto node = static_cast<std::size_t>(place);
+    const float part = place - static_cast<float>(node);
+    return x < kReach ? nodes_[node] + part * (nodes_[node + 1] - nodes_[node]) : 0;
+  }
+
+ private:
+  static constexpr float kNodesPerUnit = 32;
+  static constexpr float kReach = 12;
+  std::array<float, 12 * 32 + 2> nodes_{};
+};
+
+/// log(1 + exp(x)), to 1e-4.
+float softplus(float x) {
+  static const SoftplusTail tail;
+  return std::max(x, 0.0F) + tail(std::abs(x));
+}
 double sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
@@ -34,6 +55,7 @@ FeatureMeasurement::FeatureMeasurement(const FeatureParams& params, const Object
     : params_(params),
       distance_(object),
       radius_(radiusOf(object.mesh)),
+      free_axis_(object.symmetry.free_axis),
       extractor_(params, camera, detector),
       landmarks_(params.landmarks) {}
 
@@ -81,12 +103,7 @@ void FeatureMeasurement::makePoints() {
 
 void FeatureMeasurement::score(const ParticlePose* poses, std::size_t count,
                                float* log_likelihood) const {
-  constexpr std::size_t kGrain = 64;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      for (std::size_t i = range.begin(); i != range.end(); ++i)
-                        log_likelihood[i] = scoreOne(poses[i]);
-                    });
+  for (std::size_t i = 0; i < count; ++i) log_likelihood[i] = scoreOne(poses[i]);
 }
 
 float FeatureMeasurement::scoreOne(const ParticlePose& pose) const {
@@ -122,8 +139,8 @@ FeatureSupport FeatureMeasurement::support(const Pose& camera_from_object) const
       const double belongs = sigmoid(exponent);
       Eigen::Matrix<double, 3, 6> jacobian;  // of the landmark's place by the camera twist
       jacobian << Eigen::Matrix3d::Identity(), -skew(turned);
-      sums.information += belongs * jacobian.transpose() * weight * jacobian;
-      sums.gradient += belongs * jacobian.transpose() * weight * apart;
+      sums.landmark_information += belongs * jacobian.transpose() * weight * jacobian;
+      sums.landmark_gradient += belongs * jacobian.transpose() * weight * apart;
       sums.log_likelihood += softplus(static_cast<float>(exponent));
       sums.landmark_points += belongs;
     } else {
@@ -140,20 +157,42 @@ FeatureSupport FeatureMeasurement::support(const Pose& camera_from_object) const
       sums.surface_points += belongs;
     }
   }
-  sums.information *= params_.independent_share;
-  sums.gradient *= params_.independent_share;
+  sums.landmark_information *= params_.independent_share;
+  sums.landmark_gradient *= params_.independent_share;
+  sums.information = params_.independent_share * sums.information + sums.landmark_information;
+  sums.gradient = params_.independent_share * sums.gradient + sums.landmark_gradient;
   sums.log_likelihood *= params_.independent_share;
   return sums;
 }
 
-PosePrior FeatureMeasurement::refine(const PosePrior& prior) const {
+/// Of the camera twist that all landmarks may be off by.
+Matrix6d FeatureMeasurement::mapCovariance(const Pose& camera_from_object) const {
+  const Eigen::Vector3d axis = camera_from_object.linear() * free_axis_;
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.topLeftCorner<3, 3>().diagonal().setConstant(std::pow(params_.map_position_sigma, 2));
+  covariance.bottomRightCorner<3, 3>() = std::pow(params_.map_rotation_sigma_deg * M_PI / 180, 2) *
+                                         (Eigen::Matrix3d::Identity() - axis * axis.transpose());
+  return covariance;
+}
+
+PosePrior FeatureMeasurement::refine(const PosePrior& prior,
+                                     const std::optional<Pose>& start) const {
   PosePrior posterior = prior;
+  if (start) posterior.mean = *start;
   for (int i = 0; i < kIterations; ++i) {
     const FeatureSupport sums = support(posterior.mean);
+    // (information^-1 + map covariance)^-1, also where the information is singular.
+    const Matrix6d blur =
+        Matrix6d::Identity() + sums.landmark_information * mapCovariance(posterior.mean);
+    const Eigen::PartialPivLU<Matrix6d> bounded(blur);
+    const Matrix6d landmark_information = bounded.solve(sums.landmark_information);
+    const Twist landmark_gradient = bounded.solve(sums.landmark_gradient);
     const Twist from_prior = cameraTwistBetween(prior.mean, posterior.mean);
-    posterior.information = prior.information + sums.information;
+    posterior.information = prior.information + sums.information - sums.landmark_information +
+                            0.5 * (landmark_information + landmark_information.transpose());
+    const Twist gradient = sums.gradient - sums.landmark_gradient + landmark_gradient;
     const Twist step =
-        posterior.information.ldlt().solve(Twist(sums.gradient - prior.information * from_prior));
+        posterior.information.ldlt().solve(Twist(gradient - prior.information * from_prior));
     if (!step.allFinite()) return prior;
     posterior.mean = normalized(movedInCamera(posterior.mean, step));
     if (step.head<3>().norm() < kStill && step.tail<3>().norm() < kStill / radius_) break;

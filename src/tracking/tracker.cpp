@@ -1,6 +1,7 @@
 #include "leap_object_tracker/tracking/tracker.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <stdexcept>
 
 #include "leap_object_tracker/tracking/contour_measurement.hpp"
+#include "leap_object_tracker/tracking/feature_tracking.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/pose_belief.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
@@ -35,6 +37,7 @@ constexpr double kLearningSupport = 0.7;     // of a pose at which the object's 
 constexpr double kExact = 0.5;               // [px]
 constexpr int kPatience = 3;                 // frames below it before the object counts as lost
 constexpr double kFoundSupport = 0.6;        // share of the contour that a found pose must have
+constexpr double kLandmarkSupport = 0.6;     // FeatureTracking::support to stand by a pose
 constexpr float kOutsideVolume = 1000;       // [nats] against a pose outside the working volume
 constexpr int kNearFrames = 30;  // for which a lost object is looked for near its last pose
 constexpr double kFoundPositionSigma = 0.003;  // [m]
@@ -57,12 +60,11 @@ class Tracker::Impl {
         filter_(params.filter),
         measurement_(params.contour, params.eyes, camera),
         refiner_(params.contour, camera),
+        features_(params, object_, camera),
         search_(params, object_, model_, camera),
         arena_(std::max(1, params.threads)) {
     check(camera.focal_length > 0 && camera.baseline > 0 && camera.size.area() > 0,
           "tracker: the camera needs a focal length, a baseline and a size");
-    check(params.measurement == "contour",
-          "tracker: measurement must be 'contour' (others are not available yet)");
     check(!object.mesh.vertices.empty(), "tracker: the object has no mesh");
     Eigen::Vector3d low = object.mesh.vertices.front(), high = low;
     for (const auto& vertex : object.mesh.vertices) {
@@ -78,14 +80,14 @@ class Tracker::Impl {
   void start(const Pose& camera_from_object) {
     belief_ = beliefAt(camera_from_object, params_.start.position_sigma,
                        params_.start.rotation_sigma_deg * M_PI / 180);
-    filter_.initialize(belief_.pose, belief_.poseCovariance(), belief_.velocity,
-                       belief_.velocityCovariance());
+    initializeFilter();
     report_.state = TrackerState::kTracking;
     weak_frames_ = 0;
     fresh_ = true;
     confirming_ = false;
     last_seen_.reset();
     last_stamp_.reset();
+    features_.restart();
   }
 
   void search() {
@@ -105,6 +107,10 @@ class Tracker::Impl {
     std::optional<PoseEstimate> estimate;
     arena_.execute([&] { estimate = trackInArena(frame, fixed_from_camera); });
     return estimate;
+  }
+
+  void saveLandmarks(const std::string& path) const {
+    features_.landmarks().save(path, object_.name);
   }
 
   const TrackerParams params_;
@@ -128,14 +134,20 @@ class Tracker::Impl {
     predict(frame.stamp, camera_motion);
 
     auto started = Clock::now();
-    measurement_.observe(frame, regions(belief_));
+    std::array<cv::Rect, 2> where = regions(belief_);
+    if (fresh_ && !confirming_) {
+      if (const auto known = features_.absolute(frame, where, belief_.pose))
+        belief_.pose = *known, initializeFilter();
+    }
+    features_.observe(frame, where, belief_);
+    if (!features_.alone()) measurement_.observe(frame, where);
     report_.edges_ms = millisecondsSince(started);
 
     started = Clock::now();
     filter_.inject(kDoubtShare, belief_.pose, belief_.poseCovariance() + doubt(belief_.pose),
                    belief_.velocity, belief_.velocityCovariance());
     scoreParticles();
-    const RefinedPose refined = refineBest();
+    const RefinedPose refined = features_.alone() ? refineByFeatures() : refineBest();
     takeOver(refined);
     report_.filter_ms = millisecondsSince(started);
 
@@ -163,14 +175,20 @@ class Tracker::Impl {
     Pose pose = found->camera_from_object;
     if (last_seen_) pose = nearestEquivalent(pose, *last_seen_, object_.symmetry);
     belief_ = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
-    filter_.initialize(belief_.pose, belief_.poseCovariance(), belief_.velocity,
-                       belief_.velocityCovariance());
+    features_.restart();
+    if (const auto known = features_.absolute(frame, regions(belief_), pose)) belief_.pose = *known;
+    initializeFilter();
     appearance_ = {};
     appearance_.bright_inside = std::clamp(found->bright_inside, 0.3, 0.9);
     last_stamp_ = frame.stamp;
     weak_frames_ = 0;
     fresh_ = true;
     confirming_ = true;
+  }
+
+  void initializeFilter() {
+    filter_.initialize(belief_.pose, belief_.poseCovariance(), belief_.velocity,
+                       belief_.velocityCovariance());
   }
 
   Pose cameraMotion(const std::optional<Pose>& fixed_from_camera) {
@@ -237,7 +255,12 @@ class Tracker::Impl {
     using Sharpness = ContourMeasurement::Sharpness;
     const auto scorer = [&](Sharpness sharpness) {
       return [this, sharpness](const ParticlePose* poses, std::size_t count, float* out) {
-        measurement_.score(model_, sharpness, poses, count, out);
+        if (features_.alone())
+          std::fill(out, out + count, 0.0F);
+        else
+          measurement_.score(model_, sharpness, poses, count, out);
+        if (sharpness == Sharpness::kSharp || features_.alone())
+          features_.addScores(poses, count, out);
         for (std::size_t i = 0; i < count; ++i) {
           const float depth = poses[i].translation[2];
           if (!(depth > params_.volume.nearest && depth < params_.volume.farthest))
@@ -262,6 +285,7 @@ class Tracker::Impl {
       const Twist shift = cameraTwistBetween(expected.mean, pose);
       return 0.5 * shift.dot(expected.information * shift);
     };
+    const PosePrior with_features = features_.refine(prior);
     std::vector<Pose> starts{belief_.pose};
     const auto& scores = filter_.logLikelihoods();
     std::vector<std::uint32_t> order(scores.size());
@@ -288,7 +312,16 @@ class Tracker::Impl {
           model_, measurement_.fields(), starts[i], expected ? prior : doubted, appearance_,
           i == 0 && !fresh_ ? std::vector<double>{6, 4, 2.5} : std::vector<double>{8, 5, 3, 2.5});
     };
-    refine(0);
+    RefinedPose by_features;
+    const auto refineByBoth = [&] {
+      by_features = refiner_.refine(model_, measurement_.fields(), with_features.mean,
+                                    with_features, appearance_, {6, 4, 2.5});
+    };
+    // With what features add and without, should they be of something else.
+    if (features_.speak())
+      tbb::parallel_invoke([&] { refine(0); }, refineByBoth);
+    else
+      refine(0);
     const Pose& first = refined[0].camera_from_object;
     const double depth = std::max(0.03, first.translation().z());
     const double same = 2.5 / (camera_.focal_length / depth);  // [m] that 2.5 px stand for
@@ -305,18 +338,41 @@ class Tracker::Impl {
     tbb::parallel_for(std::size_t{1}, starts.size(), refine);
 
     const auto score = [&](const RefinedPose& candidate) {
-      return candidate.log_likelihood -
+      return candidate.log_likelihood + features_.score(candidate.camera_from_object) -
              std::min(surprise(prior, candidate.camera_from_object),
                       kDoubtCost + surprise(doubted, candidate.camera_from_object));
     };
     RefinedPose best = refined[0];
     for (const RefinedPose& candidate : refined)
       if (score(candidate) > score(best)) best = candidate;
+    const bool use_features = features_.speak() && score(by_features) >= score(best);
+    if (use_features) best = by_features;
     const bool expected = surprise(prior, best.camera_from_object) <
                           kDoubtCost + surprise(doubted, best.camera_from_object);
     if (!expected) belief_.widen(doubt(belief_.pose));
-    polish(best, expected ? prior : doubted);
+    polish(best, use_features ? with_features : expected ? prior : doubted);
+    if (use_features) best.information += with_features.information - prior.information;
     return best;
+  }
+
+  /// The pose of features and prediction; of two starts the one that explains both best.
+  RefinedPose refineByFeatures() const {
+    const PosePrior prior{belief_.pose, belief_.poseCovariance().inverse()};
+    const auto& scores = filter_.logLikelihoods();
+    const auto best_particle = std::max_element(scores.begin(), scores.end()) - scores.begin();
+    const PosePrior ahead = features_.refine(prior);
+    const PosePrior elsewhere = features_.refine(
+        prior, toPose(filter_.particles()[static_cast<std::size_t>(best_particle)].pose));
+    const auto score = [&](const Pose& pose) {
+      const Twist shift = cameraTwistBetween(prior.mean, pose);
+      return features_.score(pose) - 0.5 * shift.dot(prior.information * shift);
+    };
+    const PosePrior& posterior = score(elsewhere.mean) > score(ahead.mean) ? elsewhere : ahead;
+    RefinedPose refined;
+    refined.camera_from_object = posterior.mean;
+    refined.information = posterior.information - prior.information;
+    refined.bright_inside = appearance_.bright_inside;
+    return refined;
   }
 
   /// Refines once more on the contour of exactly this view, where the model knows only one nearby.
@@ -334,9 +390,10 @@ class Tracker::Impl {
   }
 
   void takeOver(const RefinedPose& refined) {
-    report_.support = refined.support();
+    const double landmark_support = features_.support(refined.camera_from_object);
+    report_.support = features_.alone() ? landmark_support : refined.support();
     const bool supported =
-        report_.support >= kLeastSupport ||
+        report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
         (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_);
     if (confirming_) {
       confirming_ = false;
@@ -345,7 +402,7 @@ class Tracker::Impl {
     }
     if (supported) {
       belief_.update(refined.camera_from_object, refined.information);
-      if (report_.support > kLearningSupport)
+      if (!features_.alone() && report_.support > kLearningSupport)
         refiner_.learn(model_, measurement_.fields(), belief_.pose, appearance_);
       weak_frames_ = 0;
       last_seen_ = belief_.pose;
@@ -354,6 +411,7 @@ class Tracker::Impl {
       report_.state = TrackerState::kLost;
       frames_lost_ = 0;
     }
+    features_.conclude(belief_, supported);
     fresh_ = false;
     filter_.resample(params_.filter.resample_below);
     if (supported)
@@ -363,6 +421,7 @@ class Tracker::Impl {
 
   ContourMeasurement measurement_;
   PoseRefiner refiner_;
+  FeatureTracking features_;
   PoseSearch search_;
   tbb::task_arena arena_;
   std::array<Eigen::Vector3d, 8> corners_;
@@ -394,6 +453,8 @@ std::optional<PoseEstimate> Tracker::track(const RectifiedStereoFrame& frame,
 }
 
 const TrackerReport& Tracker::report() const { return impl_->report_; }
+
+void Tracker::saveLandmarks(const std::string& path) const { impl_->saveLandmarks(path); }
 
 std::vector<Pose> Tracker::particles() const {
   std::vector<Pose> poses;

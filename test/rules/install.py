@@ -12,7 +12,7 @@ FILES = [
     "lib/leap_object_tracker/track_bag", "lib/leap_object_tracker/evaluate",
     "lib/libleap_nodelets.so", "share/leap_object_tracker/package.xml",
     "share/leap_object_tracker/config/nodelets.xml",
-    "share/leap_object_tracker/config/tracker_contour.yaml",
+    "share/leap_object_tracker/config/tracker.yaml",
     "share/leap_object_tracker/config/objects/prism.yaml",
     "share/leap_object_tracker/config/udev",
     "share/leap_object_tracker/launch/leap.launch",
@@ -45,7 +45,7 @@ def main():
         share = prefix / "share/leap_object_tracker"
         subprocess.run([program, share / "bags/wobble_prism.bag", "--object",
                         share / "config/objects/prism.yaml", "--config",
-                        share / "config/tracker_contour.yaml", "--out", folder + "/poses.tum"],
+                        share / "config/tracker.yaml", "--out", folder + "/poses.tum"],
                        env=clean, check=True)
         poses = [line for line in open(folder + "/poses.tum") if not line.startswith("#")]
         if len(poses) < 10:

@@ -21,6 +21,9 @@ struct EvaluationParams {
   double good_position = 0.005;    ///< [m] what counts as found again
   double good_rotation = 0.0873;   ///< [rad]
   double longest_lag = 0.1;        ///< [s] searched to both sides
+  /// Whether turns that the shape does not show count as well, where texture shows them. The
+  /// object's frame is then that of the first estimate, among those that look the same.
+  bool absolute_orientation = false;
   std::vector<Stamp> frames;  ///< the stamps that a pose was due for; empty: those of the truth
 };
 

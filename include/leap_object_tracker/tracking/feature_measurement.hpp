@@ -17,11 +17,13 @@ namespace leap_object_tracker {
 
 /// What the features of one frame say about a pose near another: sums over all features.
 struct FeatureSupport {
-  Matrix6d information = Matrix6d::Zero();  ///< of the camera twist (pose_refiner.hpp)
-  Twist gradient = Twist::Zero();           ///< information * step = gradient
-  double log_likelihood = 0;                ///< as of score() [nats]
-  double surface_points = 0;                ///< how many of the features lie on the surface
-  double landmark_points = 0;               ///< how many lie on their landmarks
+  Matrix6d information = Matrix6d::Zero();           ///< of the camera twist (pose_refiner.hpp)
+  Twist gradient = Twist::Zero();                    ///< information * step = gradient
+  Matrix6d landmark_information = Matrix6d::Zero();  ///< the landmarks' part of it
+  Twist landmark_gradient = Twist::Zero();
+  double log_likelihood = 0;   ///< as of score() [nats]
+  double surface_points = 0;   ///< how many of the features lie on the surface
+  double landmark_points = 0;  ///< how many lie on their landmarks
 };
 
 /// Scores poses by the points in space that both eyes see: those that show a known landmark by
@@ -47,8 +49,11 @@ class FeatureMeasurement {
   FeatureSupport support(const Pose& camera_from_object) const;
 
   /// The pose that explains features and prior best (Gauss-Newton), and what both together know of
-  /// it: a prior for the contour (PoseRefiner), or the posterior of features alone.
-  PosePrior refine(const PosePrior& prior) const;
+  /// it: a prior for the contour (PoseRefiner), or the posterior of features alone. What landmarks
+  /// tell is bounded by how well they are known as a whole (Schmidt 1966: an error that is
+  /// considered and not estimated).
+  /// @param start where to begin; without one: at the mean of the prior
+  PosePrior refine(const PosePrior& prior, const std::optional<Pose>& start = std::nullopt) const;
 
   /// Sticks the features of the last frame to the object. Only for a pose to stand by.
   /// @param position_sigma [m], rotation_sigma [rad] how well the pose is known
@@ -74,10 +79,12 @@ class FeatureMeasurement {
   };
   void makePoints();
   float scoreOne(const ParticlePose& pose) const;
+  Matrix6d mapCovariance(const Pose& camera_from_object) const;
 
   FeatureParams params_;
   SignedDistance distance_;
-  double radius_;  ///< [m]
+  double radius_;              ///< [m]
+  Eigen::Vector3d free_axis_;  ///< of the object's symmetry; zero: none
   FeatureExtractor extractor_;
   LandmarkMap landmarks_;
   std::vector<StereoFeature> features_;

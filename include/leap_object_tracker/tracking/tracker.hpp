@@ -29,6 +29,7 @@ struct PoseEstimate {
   /// uniform angle, pi^2 / 3.
   Matrix6d covariance;
   /// Share of the visible contour that edges of the images support, both eyes together, 0 to 1.
+  /// With features alone: of the landmarks that leave no doubt of a pose.
   double support = 0;
 };
 
@@ -49,6 +50,7 @@ struct TrackerReport {
 class Tracker {
  public:
   /// @throw std::invalid_argument for parameters out of range or a camera without focal length.
+  /// @throw std::runtime_error for a map of landmarks that cannot be read (FeatureParams).
   Tracker(const TrackerParams& params, const ObjectModel& object,
           const RectifiedStereoCamera& camera);
   ~Tracker();
@@ -70,6 +72,9 @@ class Tracker {
                                     const std::optional<Pose>& fixed_from_camera = std::nullopt);
 
   const TrackerReport& report() const;
+  /// Writes the landmarks found on the object so far, for FeatureParams::map_file.
+  /// @throw std::runtime_error naming the file.
+  void saveLandmarks(const std::string& path) const;
   /// camera_from_object of each particle after the last frame.
   std::vector<Pose> particles() const;
   const ObjectModel& object() const;

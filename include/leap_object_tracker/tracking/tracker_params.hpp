@@ -3,9 +3,19 @@
 #include <cstdint>
 #include <string>
 
+#include "leap_object_tracker/tracking/feature_params.hpp"
+
 namespace leap_object_tracker {
 
 enum class Eyes { kBoth, kLeft, kRight };
+
+/// What a pose is measured by.
+enum class Measurement {
+  kContour,
+  kFeature,  ///< the contour only finds the object and leads until landmarks carry
+  kBoth,
+  kAuto,  ///< the contour, and features while the object has texture that they hold on to
+};
 
 /// How the object may move between frames.
 struct MotionParams {
@@ -50,12 +60,13 @@ struct StartParams {
 
 /// All that rules a Tracker. Defaults are written here and nowhere else.
 struct TrackerParams {
-  std::string measurement = "contour";  ///< contour | feature
+  Measurement measurement = Measurement::kAuto;
   Eyes eyes = Eyes::kBoth;
   int threads = 2;
   MotionParams motion;
   FilterParams filter;
   ContourParams contour;
+  FeatureParams feature;
   VolumeParams volume;
   StartParams start;
 };

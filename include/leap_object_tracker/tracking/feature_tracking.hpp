@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "leap_object_tracker/geometry/object_model.hpp"
+#include "leap_object_tracker/geometry/stereo_camera.hpp"
+#include "leap_object_tracker/geometry/stereo_frame.hpp"
+#include "leap_object_tracker/tracking/feature_measurement.hpp"
+#include "leap_object_tracker/tracking/pose_belief.hpp"
+#include "leap_object_tracker/tracking/tracker_params.hpp"
+
+namespace leap_object_tracker {
+
+/// When features are looked for, whether they carry a pose, and when landmarks are learnt. With
+/// Measurement::kContour, or without one of the eyes, it does nothing.
+class FeatureTracking {
+ public:
+  /// @throw std::runtime_error if the map of landmarks cannot be read.
+  FeatureTracking(const TrackerParams& params, const ObjectModel& object,
+                  const RectifiedStereoCamera& camera);
+
+  /// Another start: landmarks stay known, habits are forgotten.
+  void restart();
+
+  /// Finds the features of a frame, if it is worth while.
+  /// @param regions [px] where the object can be in each eye
+  void observe(const RectifiedStereoFrame& frame, const std::array<cv::Rect, 2>& regions,
+               const PoseBelief& belief);
+
+  /// Whether this frame's features have a say.
+  bool speak() const { return observed_; }
+  /// Whether the contour is left out: Measurement::kFeature, once landmarks carried a pose.
+  bool alone() const { return method_ == Measurement::kFeature && carried_; }
+
+  /// Adds what the features say to the log-likelihoods of poses. From several threads.
+  void addScores(const ParticlePose* poses, std::size_t count, float* log_likelihoods) const;
+  double score(const Pose& camera_from_object) const;
+
+  /// FeatureMeasurement::refine; the prior itself if the features are silent.
+  PosePrior refine(const PosePrior& prior, const std::optional<Pose>& start = std::nullopt) const;
+
+  /// Landmarks that lie where a pose puts them, as a share of those that leave no doubt; at most 1.
+  double support(const Pose& camera_from_object) const;
+
+  /// Ends a frame. Landmarks are learnt only from poses that the tracker stands by.
+  void conclude(const PoseBelief& belief, bool trusted);
+
+  /// The equivalent of a found pose that the landmarks know, so that orientations mean the same
+  /// after the object was lost; nothing if they do not know.
+  std::optional<Pose> absolute(const RectifiedStereoFrame& frame,
+                               const std::array<cv::Rect, 2>& regions, const Pose& found);
+
+  const LandmarkMap& landmarks() const { return measurement_.landmarks(); }
+
+ private:
+  double spotSigma(const PoseBelief& belief) const;
+  double rotationSigma(const PoseBelief& belief) const;
+  void keepWatch(const FeatureSupport& support);
+  std::vector<Pose> equivalents(const Pose& pose) const;
+
+  Measurement method_;
+  bool two_eyes_;
+  Symmetry symmetry_;
+  double radius_;  ///< [m]
+  FeatureMeasurement measurement_;
+  bool observed_ = false;
+  bool carried_ = false;
+  // Of Measurement::kAuto.
+  bool active_ = false;
+  int patience_ = 0;  ///< frames that features may be silent before they are left out
+  int wait_ = 0;      ///< frames to the next trial
+  int period_ = 0;    ///< frames between trials
+};
+
+}  // namespace leap_object_tracker
