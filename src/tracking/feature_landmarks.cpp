@@ -20,6 +20,8 @@ constexpr float kSpacing = 0.0006F;       // [m] between landmarks
 constexpr float kDrift = 0.006F;          // [m] that a pose may err by when a new landmark is made
 constexpr int kForgetAfter = 30;          // frames missed, for a landmark seen only a few times
 constexpr int kWellKnown = 8;             // frames
+constexpr int kExpected = 4;              // frames after which a landmark is expected
+constexpr float kFacing = 0.9F;           // cosine of view directions, 25 deg
 constexpr float kDescriptorGain = 0.1F;   // of each new sight
 constexpr int kTries = 300;               // of RANSAC
 constexpr std::size_t kLeastPairs = 8;
@@ -122,6 +124,15 @@ std::vector<int> LandmarkMap::match(const std::vector<StereoFeature>& features,
     distances[i] = best;
   }
   return matches;
+}
+
+int LandmarkMap::expected(const Pose& camera_from_object) const {
+  const Pose object_from_camera = camera_from_object.inverse();
+  return static_cast<int>(
+      std::count_if(landmarks_.begin(), landmarks_.end(), [&](const Landmark& landmark) {
+        return landmark.seen >= kExpected &&
+               viewOf(object_from_camera, landmark.position).dot(landmark.view) > kFacing;
+      }));
 }
 
 void LandmarkMap::learn(const std::vector<StereoFeature>& features, const std::vector<int>& matches,

@@ -6,11 +6,14 @@
 namespace leap_object_tracker {
 namespace {
 
-constexpr double kNoDoubt = 15;    // landmarks that leave no doubt of a pose
-constexpr double kWorthWhile = 6;  // landmarks for which features are looked for
-constexpr int kTextured = 12;      // features on the surface that are worth a trial
-constexpr int kPatience = 5;       // frames
-constexpr int kFirstPeriod = 8;    // frames
+constexpr double kNoDoubt = 15;        // landmarks that leave no doubt of a pose
+constexpr double kWorthWhile = 6;      // landmarks for which features are looked for
+constexpr int kTextured = 12;          // features on the surface that are worth a trial
+constexpr int kWellKnownSide = 12;     // landmarks that would be recognised
+constexpr double kKnownShare = 0.2;    // of the features on the surface
+constexpr double kRecallSigma = 0.02;  // [m]
+constexpr int kPatience = 5;           // frames
+constexpr int kFirstPeriod = 8;        // frames
 constexpr int kLongestPeriod = 64;
 constexpr double kSameRoll = 0.35;      // [rad] that descriptors stand
 constexpr int kFreeTurns = 12;          // tried about a free axis
@@ -56,11 +59,15 @@ double FeatureTracking::spotSigma(const PoseBelief& belief) const {
   return std::hypot(deviation.head<3>().maxCoeff(), radius_ * deviation.tail<3>().maxCoeff());
 }
 
+bool FeatureTracking::usable(const RectifiedStereoFrame& frame) const {
+  return method_ != Measurement::kContour && two_eyes_ && !frame.left.empty() &&
+         !frame.right.empty();
+}
+
 void FeatureTracking::observe(const RectifiedStereoFrame& frame,
                               const std::array<cv::Rect, 2>& regions, const PoseBelief& belief) {
   observed_ = false;
-  if (method_ == Measurement::kContour || !two_eyes_ || frame.left.empty() || frame.right.empty())
-    return;
+  if (!usable(frame)) return;
   if (method_ == Measurement::kAuto && !active_ && --wait_ > 0) return;
   measurement_.observe(frame, regions, belief.pose, spotSigma(belief));
   observed_ = true;
@@ -90,6 +97,25 @@ PosePrior FeatureTracking::refine(const PosePrior& prior, const std::optional<Po
 double FeatureTracking::support(const Pose& camera_from_object) const {
   if (!observed_) return 0;
   return std::min(1.0, measurement_.support(camera_from_object).landmark_points / kNoDoubt);
+}
+
+bool FeatureTracking::wouldKnow(const Pose& camera_from_object) const {
+  return measurement_.landmarks().expected(camera_from_object) >= kWellKnownSide;
+}
+
+bool FeatureTracking::contradict(const Pose& camera_from_object) const {
+  if (!observed_ || !wouldKnow(camera_from_object)) return false;
+  const FeatureSupport support = measurement_.support(camera_from_object);
+  const double on_surface = support.surface_points + support.landmark_points;
+  return on_surface >= kTextured && support.landmark_points < kKnownShare * on_surface;
+}
+
+std::optional<Pose> FeatureTracking::recall(const RectifiedStereoFrame& frame,
+                                            const std::array<cv::Rect, 2>& regions,
+                                            const Pose& near) {
+  if (!usable(frame) || !wouldKnow(near)) return std::nullopt;
+  measurement_.observe(frame, regions, near, kRecallSigma);
+  return measurement_.locate();
 }
 
 void FeatureTracking::conclude(const PoseBelief& belief, bool trusted) {
@@ -139,9 +165,7 @@ std::vector<Pose> FeatureTracking::equivalents(const Pose& pose) const {
 std::optional<Pose> FeatureTracking::absolute(const RectifiedStereoFrame& frame,
                                               const std::array<cv::Rect, 2>& regions,
                                               const Pose& found) {
-  if (method_ == Measurement::kContour || !two_eyes_ || frame.left.empty() || frame.right.empty() ||
-      measurement_.landmarks().landmarks().empty())
-    return std::nullopt;
+  if (!usable(frame) || measurement_.landmarks().landmarks().empty()) return std::nullopt;
   // Descriptors depend on how the camera is rolled against the views that landmarks were learnt in.
   std::vector<double> rolls;
   for (const Pose& pose : equivalents(found)) {

@@ -35,6 +35,9 @@ class LandmarkMap {
   std::vector<int> match(const std::vector<StereoFeature>& features, const Pose& camera_from_object,
                          double reach) const;
 
+  /// How many landmarks, all seen a few times, a pose turns towards the eye.
+  int expected(const Pose& camera_from_object) const;
+
   /// Takes the features of a trusted pose: known landmarks become more exact, new ones are added,
   /// those that are never seen again make room. `matches` is of match(), or -1 where the caller
   /// found a match to be wrong; `on_surface` says which features lie on the object.

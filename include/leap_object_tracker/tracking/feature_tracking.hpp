@@ -45,6 +45,9 @@ class FeatureTracking {
   /// Landmarks that lie where a pose puts them, as a share of those that leave no doubt; at most 1.
   double support(const Pose& camera_from_object) const;
 
+  /// Whether what is at this pose has a texture, but not that of the object.
+  bool contradict(const Pose& camera_from_object) const;
+
   /// Ends a frame. Landmarks are learnt only from poses that the tracker stands by.
   void conclude(const PoseBelief& belief, bool trusted);
 
@@ -53,10 +56,19 @@ class FeatureTracking {
   std::optional<Pose> absolute(const RectifiedStereoFrame& frame,
                                const std::array<cv::Rect, 2>& regions, const Pose& found);
 
+  /// The pose that landmarks tell near another, also where its contour is hidden; nothing if they
+  /// do not know.
+  std::optional<Pose> recall(const RectifiedStereoFrame& frame,
+                             const std::array<cv::Rect, 2>& regions, const Pose& near);
+
+  /// Whether so much of this side of an object is known that it would be recognised.
+  bool wouldKnow(const Pose& camera_from_object) const;
+
   const LandmarkMap& landmarks() const { return measurement_.landmarks(); }
 
  private:
   double spotSigma(const PoseBelief& belief) const;
+  bool usable(const RectifiedStereoFrame& frame) const;
   double rotationSigma(const PoseBelief& belief) const;
   void keepWatch(const FeatureSupport& support);
   std::vector<Pose> equivalents(const Pose& pose) const;
