@@ -98,8 +98,9 @@ TEST_F(DrawnBox, isRefinedToAFractionOfAMillimetre) {
   for (int axis = 0; axis < 6; ++axis) {
     Twist nudge = Twist::Zero();
     nudge[axis] = axis < 3 ? 0.002 : 0.04;
-    const RefinedPose refined = refiner.refine(
-        model_, measurement_.fields(), movedInCamera(truth_, nudge), {}, 0.8, {8, 5, 3, 2.5, 2.5});
+    const RefinedPose refined =
+        refiner.refine(model_, measurement_.fields(), movedInCamera(truth_, nudge), {},
+                       Appearance(), {8, 5, 3, 2.5, 2.5});
     const Twist error = cameraTwistBetween(truth_, refined.camera_from_object);
     EXPECT_LT(error.head<3>().norm(), 0.0004) << "axis " << axis;
     EXPECT_LT(error.tail<3>().norm(), 0.012) << "axis " << axis;
@@ -109,8 +110,8 @@ TEST_F(DrawnBox, isRefinedToAFractionOfAMillimetre) {
 
 TEST_F(DrawnBox, supportsNoPoseWhereNothingIs) {
   const PoseRefiner refiner(ContourParams(), camera_);
-  const RefinedPose refined =
-      refiner.refine(model_, measurement_.fields(), poseAt(-0.08, 0.05, 0.15), {}, 0.8, {2.5});
+  const RefinedPose refined = refiner.refine(model_, measurement_.fields(),
+                                             poseAt(-0.08, 0.05, 0.15), {}, Appearance(), {2.5});
   EXPECT_LT(refined.support(), 0.1);
 }
 
