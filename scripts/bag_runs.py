@@ -119,7 +119,8 @@ class Runs:
         """Are all files newer than the bag, the program, and the libraries of the tracker?"""
         sources = [bag, program]
         if program.name == "track_bag":
-            sources += self.options.programs.parent.glob("libleap_*.so")
+            sources += [self.options.programs.parent / f"libleap_{room}.so"
+                        for room in ("tracking", "rectification", "geometry")]
         newest = max(os.path.getmtime(path) for path in sources)
         return all(path.exists() and os.path.getmtime(path) > newest for path in paths)
 

@@ -161,21 +161,23 @@ void writeStartTable(std::ostream& out, const std::vector<StartTrial>& trials) {
   writeTimes(out, trials);
 }
 
-void writeStartCsv(std::ostream& out, const std::vector<StartTrial>& trials) {
+void writeStartCsvHeading(std::ostream& out) {
   out << "index,object,surroundings,depth_mm,off_axis_deg,visible,verdict,frame,tracked,position_"
          "mm,"
-         "orientation_deg,search_ms,total_ms\n"
-      << std::fixed;
-  for (const auto& trial : trials)
-    for (std::size_t i = 0; i < trial.frames.size(); ++i) {
-      const StartFrame& frame = trial.frames[i];
-      out << trial.index << ',' << trial.object << ',' << trial.surroundings << ','
-          << std::setprecision(1) << 1e3 * trial.depth << ',' << trial.off_axis / kDegree << ','
-          << std::setprecision(2) << trial.visible << ',' << wordFrom(verdictOf(trial, i + 1))
-          << ',' << i + 1 << ',' << frame.tracked << ',' << std::setprecision(3)
-          << 1e3 * frame.position << ',' << frame.orientation / kDegree << ',' << frame.search_ms
-          << ',' << frame.total_ms << '\n';
-    }
+         "orientation_deg,search_ms,total_ms\n";
+}
+
+void writeStartCsv(std::ostream& out, const StartTrial& trial) {
+  out << std::fixed;
+  for (std::size_t i = 0; i < trial.frames.size(); ++i) {
+    const StartFrame& frame = trial.frames[i];
+    out << trial.index << ',' << trial.object << ',' << trial.surroundings << ','
+        << std::setprecision(1) << 1e3 * trial.depth << ',' << trial.off_axis / kDegree << ','
+        << std::setprecision(2) << trial.visible << ',' << wordFrom(verdictOf(trial, i + 1)) << ','
+        << i + 1 << ',' << frame.tracked << ',' << std::setprecision(3) << 1e3 * frame.position
+        << ',' << frame.orientation / kDegree << ',' << frame.search_ms << ',' << frame.total_ms
+        << '\n';
+  }
 }
 
 }  // namespace leap_object_tracker

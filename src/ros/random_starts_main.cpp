@@ -100,8 +100,10 @@ class RandomStarts {
     for (const auto& path : line.positional()) objects_.push_back(loadObject(path));
     if (line.has("only")) only_ = static_cast<int>(line.wholeNumber("only", 0, number_ - 1));
     if (line.has("save")) fs::create_directories(line.text("save"));
-    if (line.has("csv") && !std::ofstream(line.text("csv")))
-      throw std::runtime_error("cannot write '" + line.text("csv") + "'");
+    if (!line.has("csv")) return;
+    csv_.open(line.text("csv"));
+    if (!csv_) throw std::runtime_error("cannot write '" + line.text("csv") + "'");
+    writeStartCsvHeading(csv_);
   }
 
   void run() {
@@ -110,9 +112,6 @@ class RandomStarts {
       for (int scene = 0; scene < scenes_; ++scene) runScene(object, scene);
     if (isatty(STDERR_FILENO) != 0) std::fputs("\r", stderr);
     writeStartTable(std::cout, trials_);
-    if (!line_.has("csv")) return;
-    std::ofstream file(line_.text("csv"));
-    writeStartCsv(file, trials_);
   }
 
  private:
@@ -144,6 +143,10 @@ class RandomStarts {
       trial.surroundings = wordFrom(random.surroundings);
       runTrial(model, placement, rectifier, simulator, trial);
       trials_.push_back(trial);
+      if (csv_.is_open()) {
+        writeStartCsv(csv_, trial);
+        csv_.flush();
+      }
       if (isatty(STDERR_FILENO) != 0)
         std::fprintf(stderr, "\r%zu of %d starts ", trials_.size(), number_);
     }
@@ -245,6 +248,7 @@ class RandomStarts {
   int only_ = -1;
   std::vector<ObjectModel> objects_;
   std::vector<StartTrial> trials_;
+  std::ofstream csv_;
 };
 
 int run(int argc, char** argv) {

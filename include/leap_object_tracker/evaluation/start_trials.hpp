@@ -47,7 +47,10 @@ StartVerdict verdictOf(const StartTrial& trial, std::size_t number);
 /// A Markdown table: a line for each object, surroundings, depth, angle and all, then times.
 void writeStartTable(std::ostream& out, const std::vector<StartTrial>& trials);
 
-/// One line for each trial, errors in [mm] and [deg].
-void writeStartCsv(std::ostream& out, const std::vector<StartTrial>& trials);
+/// The headings of writeStartCsv.
+void writeStartCsvHeading(std::ostream& out);
+
+/// One line for each frame of a trial, errors in [mm] and [deg].
+void writeStartCsv(std::ostream& out, const StartTrial& trial);
 
 }  // namespace leap_object_tracker

@@ -78,7 +78,7 @@ TEST(StartTable, countsByObjectAndDepth) {
 
 TEST(StartCsv, hasALineForEachFrame) {
   std::ostringstream out;
-  writeStartCsv(out, {trialAt(0.08, {StartFrame{}, frameOff(1.25, 2.5)})});
+  writeStartCsv(out, trialAt(0.08, {StartFrame{}, frameOff(1.25, 2.5)}));
   EXPECT_THAT(out.str(), HasSubstr("0,cube,dark wall,80.0,0.0,0.00,inexact,2,1,1.250,2.500,"));
 }
 
