@@ -99,7 +99,11 @@ class PolyhedronTable : public ContourModel::Table {
         const Eigen::Vector3d hidden = faces_[edge.faces[first ? 1 : 0]].head<3>().cast<double>();
         outward = (hidden - seen * seen.dot(hidden)).normalized();
       }
-      segments.push_back({edge.start, edge.end, outward, false});
+      ContourSegment segment{edge.start, edge.end, outward};
+      for (std::size_t side = 0; side < 2; ++side)
+        if (side == 0 ? first : second)
+          segment.faces[side] = faces_[edge.faces[side]].head<3>().cast<double>();
+      segments.push_back(segment);
     }
     return segments;
   }
@@ -142,6 +146,13 @@ class CylinderTable : public ContourModel::Table {
   static constexpr int kLimbSteps = 45;
   static constexpr int kRimPieces = 180;
 
+  /// What an eye sees of a piece of the rim between side and cap.
+  struct Rim {
+    bool visible = false;
+    Eigen::Vector3d outward = Eigen::Vector3d::Zero();
+    std::array<Eigen::Vector3d, 2> faces{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  };
+
   /// @param limb angle [rad] from the eye's direction to where the side turns away
   static std::vector<ContourSegment> segments(double radius, double height, double edge_radius,
                                               int cap, double limb) {
@@ -149,16 +160,20 @@ class CylinderTable : public ContourModel::Table {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector3d normal(std::cos(limb), side * std::sin(limb), 0);
       const Eigen::Vector3d foot = radius * normal, up(0, 0, height / 2);
-      all.push_back({foot - up, foot + up, normal, true});
+      all.push_back({foot - up, foot + up, normal, true, {}});
     }
     for (const int end : {-1, 1})
       addRim(
           radius, height, edge_radius, end,
           [&](double angle, const Eigen::Vector3d& radial) {
+            Rim rim;
             const bool side_seen = std::abs(angle) < limb, cap_seen = cap == end;
-            if (side_seen && cap_seen) return std::make_pair(true, Eigen::Vector3d(0, 0, 0));
-            if (side_seen) return std::make_pair(true, Eigen::Vector3d(0, 0, end));
-            return std::make_pair(cap_seen, radial);
+            rim.visible = side_seen || cap_seen;
+            if (side_seen != cap_seen)
+              rim.outward = side_seen ? Eigen::Vector3d(0, 0, end) : radial;
+            if (side_seen) rim.faces[0] = radial;
+            if (cap_seen) rim.faces[1] = Eigen::Vector3d(0, 0, end);
+            return rim;
           },
           all);
     return all;
@@ -169,7 +184,14 @@ class CylinderTable : public ContourModel::Table {
     std::vector<ContourSegment> all;
     addRim(
         radius, height, edge_radius, cap,
-        [](double, const Eigen::Vector3d& radial) { return std::make_pair(true, radial); }, all);
+        [cap](double, const Eigen::Vector3d& radial) {
+          Rim rim;
+          rim.visible = true;
+          rim.outward = radial;
+          rim.faces[1] = Eigen::Vector3d(0, 0, cap);
+          return rim;
+        },
+        all);
     return all;
   }
 
@@ -186,8 +208,10 @@ class CylinderTable : public ContourModel::Table {
     for (int i = 0; i < kRimPieces; ++i) {
       const double angle = -M_PI + (i + 0.5) * piece;
       const Eigen::Vector3d radial(std::cos(angle), std::sin(angle), 0);
-      const auto [visible, outward] = judge(angle, radial);
-      if (visible) all.push_back({at(angle - piece / 2), at(angle + piece / 2), outward, false});
+      const Rim rim = judge(angle, radial);
+      if (rim.visible)
+        all.push_back(
+            {at(angle - piece / 2), at(angle + piece / 2), rim.outward, false, rim.faces});
     }
   }
 

@@ -14,6 +14,8 @@ struct ContourSegment {
   Eigen::Vector3d start, end;
   Eigen::Vector3d outward;  ///< as in ContourPoint
   bool limb = false;        ///< as in ContourPoint
+  /// As in ContourPoint.
+  std::array<Eigen::Vector3d, 2> faces{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
 };
 
 /// Spreads the points of a view evenly over the length of its segments.

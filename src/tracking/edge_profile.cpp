@@ -141,6 +141,7 @@ std::optional<ProfileEdge> fitProfile(const float* grey, int first, int count, d
   if (step * step < kSignificance * kSignificance * step_variance) return std::nullopt;
   ProfileEdge edge;
   edge.step = step;
+  edge.noise = std::sqrt(noise);
   edge.offset = -fitted[2] / step;
   // Of the ratio, to first order.
   unit[0] = -edge.offset, unit[1] = edge.offset, unit[2] = 1;

@@ -370,12 +370,18 @@ class ContourFinder {
       const Vector3d free = freeSide(edge, outline, ray);
       const Vector3d from = middle + kOffSurface * radius_ * (free + ray);
       if (sight_.blocked(from.cast<float>(), eye.cast<float>())) continue;
-      if (!outline)
-        segments.push_back({start, end, Vector3d::Zero()});
-      else if (edge.kind == Kind::kSmooth)
+      if (outline && edge.kind == Kind::kSmooth) {
         addLimb(edge, start, end, ray, segments);
-      else
-        segments.push_back({start, end, awayFromFace(edge, ray)});
+        continue;
+      }
+      ContourSegment segment{start, end, outline ? awayFromFace(edge, ray) : Vector3d::Zero()};
+      for (std::size_t side = 0; side < 2; ++side) {
+        if (side == 1 && edge.kind == Kind::kOpen) continue;
+        const Vector3d& normal = normals_[edge.triangles[side]];
+        if (!outline || normal.dot(ray) > 0)
+          segment.faces[side] = normal.dot(ray) > 0 ? normal : Vector3d(-normal);
+      }
+      segments.push_back(segment);
     }
   }
 
@@ -422,7 +428,7 @@ class ContourFinder {
     if (!(half.norm() > 1e-9 * radius_)) return;
     const Vector3d middle = (start + end) / 2;
     const Vector3d outward = normal.dot(awayInImage(edge, ray)) < 0 ? Vector3d(-normal) : normal;
-    segments.push_back({middle - half, middle + half, outward, true});
+    segments.push_back({middle - half, middle + half, outward, true, {}});
   }
 
   Mesh mesh_;
@@ -524,8 +530,8 @@ class ViewFile {
   }
 
  private:
-  static constexpr std::uint64_t kVersion = 3;  ///< of the format and of how views are found
-  static_assert(sizeof(ContourPoint) == 11 * sizeof(float), "written as bytes, without gaps");
+  static constexpr std::uint64_t kVersion = 4;  ///< of the format and of how views are found
+  static_assert(sizeof(ContourPoint) == 17 * sizeof(float), "written as bytes, without gaps");
 
   template <class T>
   static void put(const T* values, std::size_t count, std::vector<char>& bytes) {

@@ -18,9 +18,12 @@ constexpr int kRegionReach = 5;           // [px] on either side of an outline t
 constexpr float kRegionPull = 1.0F;       // of the region on the choice between edges
 constexpr double kRegionWeight = 1.0;     // [px] beside an outline that speak independently
 constexpr double kLearningRate = 0.1;     // a frame
-constexpr double kFine = 2.6;             // [px] ranges below this are searched by fitted steps
-constexpr int kProfile = 7;               // [px] half length of a profile that steps are fitted to
-constexpr double kLargestShift = 2;       // [px] of a fitted step
+constexpr double kMisfitWeight = 1.0;     // independent grey values of a profile
+constexpr double kOutlineSpread = 0.8, kCreaseSpread = 1.3;  // [px]
+constexpr double kSureContrast = 0.25;  // of the brightest, that an edge shows without fail
+constexpr double kFine = 2.6;           // [px] ranges below this are searched by fitted steps
+constexpr int kProfile = 7;             // [px] half length of a profile that steps are fitted to
+constexpr double kLargestShift = 2;     // [px] of a fitted step
 constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rectified image
 constexpr float kSameLine = 0.7F;               // [px]
 // [px] by how much the rounding and the gloss of an edge between two visible faces may move its
@@ -92,6 +95,19 @@ Twist cameraTwistBetween(const Pose& from, const Pose& to) {
   return twist;
 }
 
+/// How surely a contour between two faces shows. Faces are lit from beside the eyes, so that their
+/// brightness goes with the cosine of the angle at which they are seen (Lambert); nothing can be
+/// said of curved ones.
+double expectedContrast(const ContourPoint& point, const Eigen::Vector3f& to_light) {
+  float contrast = 0;
+  for (const auto& face : point.faces)
+    contrast += (&face == &point.faces[0] ? 1.0F : -1.0F) * std::max(0.0F, face.dot(to_light));
+  const bool curved = point.faces[0].isZero() && point.faces[1].isZero();
+  const double share =
+      curved ? 1 : std::min(1.0, static_cast<double>(std::abs(contrast)) / kSureContrast);
+  return share * share;
+}
+
 /// One contour point that was looked for in one eye.
 struct PoseRefiner::Match {
   Twist jacobian;                 ///< of the offset along the normal, by the camera twist [px]
@@ -108,6 +124,9 @@ struct PoseRefiner::Match {
   bool outline = false;
   bool limb = false;
   bool bright_inside = false;
+  double noise = 0;  ///< [grey levels] that the fitted step left; zero: none was fitted
+  /// Contrast that is to be expected, 1 enough to be seen, 0 none: for what is not seen to count.
+  double expected = 1;
   float region = 0;  ///< [nats/px] by which the grey values speak for an outline here
 };
 
@@ -159,6 +178,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
     const Sampler<std::uint8_t> raw(field, field.image(), 1.0F);
     const Eigen::Vector3d eye_place(eye == 0 ? 0 : camera_.baseline, 0, 0);
     const Eigen::Vector3d origin = pose.translation() - eye_place;
+    const Eigen::Vector3d light(0.5 * camera_.baseline - eye_place.x(), 0, 0);
     ViewChoice choice;
     if (exact != nullptr)
       choice.view = &(*exact)[static_cast<std::size_t>(eye)];
@@ -192,6 +212,9 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       match.length = stretch * point.length;
       match.outline = point.outline();
       match.limb = point.limb > 0;
+      const Eigen::Vector3f to_light =
+          (rotation.transpose() * (light - at)).normalized().cast<float>();
+      match.expected = expectedContrast(point, to_light);
       if (match.outline) {
         const Eigen::Vector3d out = rotation * point.outward.cast<double>();
         if (normal.dot(Eigen::Vector2d(out.x() - x * out.z(), out.y() - y * out.z())) < 0)
@@ -303,9 +326,9 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       }
       if (fine && match.found && !match.limb) fit(raw, match);
       auto& support = eyes[static_cast<std::size_t>(eye)];
-      support.visible += match.length;
+      support.visible += match.expected * match.length;
       if (match.found && std::abs(match.offset) < kSupportDistance)
-        support.supported += match.length;
+        support.supported += match.expected * match.length;
     }
   }
 }
@@ -332,6 +355,7 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
                  {static_cast<double>(match.before), static_cast<double>(match.after)});
   if (!edge || std::abs(edge->offset) > kLargestShift) return;
   match.offset = edge->offset;
+  match.noise = edge->noise;
   match.variance = params_.edge_sigma * params_.edge_sigma + edge->variance;
 }
 
@@ -397,12 +421,21 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
         judged += m.length;
         if (m.bright_inside) bright += m.length;
       }
-      gain = 1 - 0.5 * std::pow(m.offset / 0.8, 2);
+      gain = 1 - 0.5 * std::pow(m.offset / (m.outline ? kOutlineSpread : kCreaseSpread), 2);
     }
     // Against chance: an edge within reach of an arbitrary place is seen about every third time.
-    result.log_likelihood += kRegionWeight * m.samples * m.region;
-    result.log_likelihood += m.samples * std::max(gain, -1.0) + (m.found ? 0 : -m.samples);
+    result.log_likelihood += m.samples * (m.found ? std::max(gain, -m.expected) : -m.expected) +
+                             kRegionWeight * m.expected * m.samples * static_cast<double>(m.region);
   }
+  // Lines that the model lacks or has too many spoil the fits; points without a fit do not count.
+  double misfit = 0, fitted = 0, all = 0;
+  for (const Match& m : matches) {
+    all += m.expected * m.samples;
+    if (m.noise <= 0) continue;
+    fitted += m.samples;
+    misfit += m.samples * std::log(std::clamp(m.noise, 1.0, 20.0));
+  }
+  if (fitted > 0) result.log_likelihood -= kMisfitWeight * all * misfit / fitted;
   result.bright_inside = judged > 0 ? bright / judged : 0.5;
   return result;
 }

@@ -9,6 +9,7 @@ struct ProfileEdge {
   double offset = 0;    ///< [px] from where the edge was expected, along the profile
   double variance = 0;  ///< [px^2] from the noise that the fit left
   double step = 0;      ///< [grey levels] the far side of the edge less the near side
+  double noise = 0;     ///< [grey levels] deviation of what the fit left
 };
 
 /// Other edges that the profile crosses, as expected [px]; none: infinite.

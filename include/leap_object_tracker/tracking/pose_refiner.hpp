@@ -24,7 +24,7 @@ struct PosePrior {
   Matrix6d information = Matrix6d::Zero();  ///< inverse covariance; zero: nothing is known
 };
 
-/// How one eye supports a pose.
+/// How one eye supports a pose. Lengths count by the contrast that is to be expected.
 struct EyeSupport {
   double visible = 0;    ///< [px] length of the contour inside the image
   double supported = 0;  ///< [px] of it, with an edge of the right direction at the right place
