@@ -58,6 +58,10 @@ def check_losses(table):
     declared, relocked = found[0]
     check(declared == 2, f"declared after two frames, not {declared}")
     check(abs(relocked - 0.2) < 1e-9, f"found again 0.2 s after its return, not {relocked}")
+    for one in frames[2:6]:
+        one.tracked = True
+    check(table.losses(frames)[0][0] is None, "hidden too shortly to be declared lost")
+    check(table.losses(frames[:6] + frames[2:6] * 3)[0][0] == math.inf, "never declared lost")
     for one in frames[6:]:
         one.tracked = False
     check(table.losses(frames)[0][1] == math.inf, "never found again")
