@@ -40,6 +40,7 @@ prints how often it is right in the third frame, by object, surroundings and dep
   --scenes N              random surroundings and paints of each object (10)
   --depth NEAR FAR        [m] of the object's origin (0.04 0.30)
   --uniform               depths evenly over metres instead of their logarithm
+  --widest DEG            off the axis of the pair at most (90)
   --visible SHARE         of the object that each eye sees at least (0.7)
   --frames N              of each sequence (4)
   --config FILE.yaml      parameters of the tracker (config/tracker_*.yaml)
@@ -52,9 +53,10 @@ prints how often it is right in the third frame, by object, surroundings and dep
 )";
 
 const std::map<std::string, int> kOptions{
-    {"number", 1},  {"seed", 1},   {"scenes", 1},        {"depth", 2},  {"uniform", 0},
-    {"visible", 1}, {"frames", 1}, {"calibration", 1},   {"config", 1}, {"threads", 1},
-    {"csv", 1},     {"only", 1},   {"list-failures", 0}, {"save", 1},   {"help", 0}};
+    {"number", 1},      {"seed", 1},          {"scenes", 1},  {"depth", 2},
+    {"uniform", 0},     {"visible", 1},       {"widest", 1},  {"frames", 1},
+    {"calibration", 1}, {"config", 1},        {"threads", 1}, {"csv", 1},
+    {"only", 1},        {"list-failures", 0}, {"save", 1},    {"help", 0}};
 
 constexpr std::size_t kDue = 3;  // the frame that is judged
 
@@ -77,6 +79,7 @@ PlacementRange readRange(const CommandLine& line) {
     range.farthest = line.number("depth", 1, range.nearest, 2);
   }
   range.uniform = line.has("uniform");
+  if (line.has("widest")) range.widest = M_PI / 180 * line.number("widest", 0, 5, 90);
   if (line.has("visible")) range.least_visible = line.number("visible", 0, 0.1, 1);
   return range;
 }

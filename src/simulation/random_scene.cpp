@@ -264,6 +264,8 @@ MotionScript RandomPlacement::draw(HashRandom& random) const {
       motion.rest.linear() = randomTurn(random);
       if (!(ray.z() > 0.05 * ray.norm())) continue;
       motion.rest.translation() = ray * (depth / ray.z());
+      const Vector3d from_middle = motion.rest.translation() - Vector3d(camera_.baseline / 2, 0, 0);
+      if (std::atan2(from_middle.head<2>().norm(), from_middle.z()) > range_.widest) continue;
       if (!fits(motion.rest)) continue;
       if (random.uniform() < 0.5) {
         MotionScript::Wobble wobble;

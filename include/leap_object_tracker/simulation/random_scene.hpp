@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -35,6 +36,7 @@ struct PlacementRange {
   double nearest = 0.04;         ///< [m] depth of the object's origin
   double farthest = 0.30;        ///< [m]
   bool uniform = false;          ///< depths evenly over metres, else over their logarithm
+  double widest = M_PI / 2;      ///< [rad] off the axis of the pair, seen from between the eyes
   double least_visible = 0.7;    ///< share of the side facing each eye that lies inside its images
   double least_distance = 0.02;  ///< [m] from each eye to the surface
 };

@@ -66,6 +66,18 @@ TEST(RandomPlacement, keepsToItsRangeAndToBothImages) {
   EXPECT_GT(widest, 50 * M_PI / 180);
 }
 
+TEST(RandomPlacement, staysNearTheAxisIfTold) {
+  const Scene scene = randomScene(cube(), kCalibration, 1).scene;
+  PlacementRange range;
+  range.widest = 0.3;
+  const RandomPlacement placement(scene, cameraOf(scene), range);
+  HashRandom random(3);
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector3d at = placement.draw(random).rest.translation();
+    EXPECT_LE(std::hypot(at.x() - 0.02, at.y()), std::tan(0.301) * at.z());
+  }
+}
+
 TEST(RandomPlacement, countsWhatTheImagesShow) {
   const Scene scene = randomScene(cube(), kCalibration, 1).scene;
   const RectifiedStereoCamera camera = cameraOf(scene);
