@@ -221,7 +221,9 @@ void FeatureExtractor::findFast(EyeImage& eye) const {
   const int threshold = std::max(
       kLowestThreshold,
       static_cast<int>(std::lround(params_.least_contrast * contrastOf(eye.scaled(inside)))));
-  std::vector<cv::KeyPoint> found;
+  std::vector<cv::KeyPoint>& found = eye.found;
+  eye.taken.create(eye.scaled.size(), CV_8UC1);
+  eye.taken = 0;
   cv::FAST(eye.scaled, found, threshold, true);
   std::sort(found.begin(), found.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
     return std::make_tuple(-a.response, a.pt.y, a.pt.x) <
@@ -231,12 +233,10 @@ void FeatureExtractor::findFast(EyeImage& eye) const {
     if (eye.corners.size() >= static_cast<std::size_t>(params_.corners)) break;
     const cv::Point place(cvRound(point.pt.x), cvRound(point.pt.y));
     if (!inside.contains(place)) continue;
-    const bool crowded =
-        std::any_of(eye.corners.begin(), eye.corners.end(), [&](const Corner& other) {
-          const cv::Point apart = other.place - place;
-          return apart.dot(apart) < kCornerSpacing * kCornerSpacing;
-        });
-    if (!crowded) eye.corners.push_back({place, point.response, {}});
+    if (eye.taken.at<unsigned char>(place) != 0) continue;
+    eye.taken(cv::Rect(place.x - kCornerSpacing + 1, place.y - kCornerSpacing + 1,
+                       2 * kCornerSpacing - 1, 2 * kCornerSpacing - 1)) = 1;
+    eye.corners.push_back({place, point.response, {}});
   }
 }
 

@@ -69,6 +69,10 @@ void FeatureMeasurement::observe(const RectifiedStereoFrame& frame,
   window.farthest = std::max(2 * kNearestDepth, predicted.translation().z() + reach);
   window.roll = landmarks_.rollOf(predicted.linear());
   features_ = extractor_.extract(frame, window);
+  expect(predicted, uncertainty);
+}
+
+void FeatureMeasurement::expect(const Pose& predicted, double uncertainty) {
   matches_ = landmarks_.match(features_, predicted, std::max(kLeastReach, 3 * uncertainty));
   makePoints();
 }

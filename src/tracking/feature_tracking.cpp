@@ -6,20 +6,25 @@
 namespace leap_object_tracker {
 namespace {
 
-constexpr double kNoDoubt = 15;        // landmarks that leave no doubt of a pose
-constexpr double kWorthWhile = 6;      // landmarks for which features are looked for
-constexpr int kTextured = 12;          // features on the surface that are worth a trial
-constexpr int kWellKnownSide = 12;     // landmarks that would be recognised
-constexpr double kKnownShare = 0.2;    // of the features on the surface
-constexpr double kRecallSigma = 0.02;  // [m]
-constexpr int kPatience = 5;           // frames
-constexpr int kFirstPeriod = 8;        // frames
-constexpr int kLongestPeriod = 64;
+constexpr double kNoDoubt = 15;         // landmarks that leave no doubt of a pose
+constexpr double kWorthWhile = 6;       // landmarks that carry a pose
+constexpr int kWellKnownSide = 20;      // landmarks of which some would be recognised
+constexpr double kNotSeen = 3;          // fewer are as good as none
+constexpr std::size_t kTextured = 12;   // features of something that has texture
+constexpr double kClearContour = 0.75;  // share of it, above which features have little to add
+constexpr double kHiddenContour = 0.6;  // share of it
+constexpr int kTrial = 5;               // frames
+constexpr int kReminder = 8;            // frames between looks at features that are not needed
+constexpr int kFirstPeriod = 16;        // frames
+constexpr int kLongestPeriod = 64;      // frames
+constexpr int kRefusals = 60;           // frames
+constexpr double kRecallSigma = 0.01;   // [m]
 constexpr double kSameRoll = 0.35;      // [rad] that descriptors stand
 constexpr int kFreeTurns = 12;          // tried about a free axis
-constexpr double kSamePlace = 0.008;    // [m] between the pose of the contour and of landmarks
 constexpr double kSameRotation = 0.35;  // [rad]
-constexpr double kFoundSigma = 0.003;   // [m]
+constexpr double kFoundSigma = 0.002;   // [m]
+constexpr double kFoundTurn = 0.15;     // [rad]
+constexpr double kClearlyFewer = 0.6;   // landmarks, than those of the best
 
 }  // namespace
 
@@ -32,14 +37,15 @@ FeatureTracking::FeatureTracking(const TrackerParams& params, const ObjectModel&
       measurement_(params.feature, object, camera) {
   if (!params.feature.map_file.empty())
     measurement_.landmarks().load(params.feature.map_file, object.name);
-  restart();
+  restart(false);
 }
 
-void FeatureTracking::restart() {
+void FeatureTracking::restart(bool sure) {
   observed_ = carried_ = false;
-  active_ = true;
-  patience_ = kPatience;
+  unsure_ = !sure && !measurement_.landmarks().landmarks().empty();
+  doubts_ = 0;
   wait_ = 0;
+  trial_ = kTrial;
   period_ = kFirstPeriod;
 }
 
@@ -68,7 +74,7 @@ void FeatureTracking::observe(const RectifiedStereoFrame& frame,
                               const std::array<cv::Rect, 2>& regions, const PoseBelief& belief) {
   observed_ = false;
   if (!usable(frame)) return;
-  if (method_ == Measurement::kAuto && !active_ && --wait_ > 0) return;
+  if (method_ == Measurement::kAuto && --wait_ > 0) return;
   measurement_.observe(frame, regions, belief.pose, spotSigma(belief));
   observed_ = true;
 }
@@ -103,11 +109,26 @@ bool FeatureTracking::wouldKnow(const Pose& camera_from_object) const {
   return measurement_.landmarks().expected(camera_from_object) >= kWellKnownSide;
 }
 
-bool FeatureTracking::contradict(const Pose& camera_from_object) const {
-  if (!observed_ || !wouldKnow(camera_from_object)) return false;
-  const FeatureSupport support = measurement_.support(camera_from_object);
-  const double on_surface = support.surface_points + support.landmark_points;
-  return on_surface >= kTextured && support.landmark_points < kKnownShare * on_surface;
+/// Whether none of the landmarks is there, of a side that is known well.
+bool FeatureTracking::missing(const Pose& camera_from_object, const FeatureSupport& support) const {
+  return support.landmark_points < kNotSeen && wouldKnow(camera_from_object);
+}
+
+bool FeatureTracking::contradict(const Pose& camera_from_object, double contour_support) const {
+  return observed_ &&
+         (measurement_.features().size() >= kTextured || contour_support < kHiddenContour) &&
+         missing(camera_from_object, measurement_.support(camera_from_object));
+}
+
+bool FeatureTracking::refuse(const Pose& found) {
+  const std::vector<Pose> poses = equivalents(found);
+  if (measurement_.features().size() < kTextured ||
+      std::none_of(poses.begin(), poses.end(), [&](const Pose& pose) { return wouldKnow(pose); }))
+    return false;
+  if (++refusals_ < kRefusals) return true;
+  refusals_ = 0;
+  measurement_.landmarks().clear();
+  return false;
 }
 
 std::optional<Pose> FeatureTracking::recall(const RectifiedStereoFrame& frame,
@@ -118,31 +139,43 @@ std::optional<Pose> FeatureTracking::recall(const RectifiedStereoFrame& frame,
   return measurement_.locate();
 }
 
-void FeatureTracking::conclude(const PoseBelief& belief, bool trusted) {
-  if (!observed_) return;
+void FeatureTracking::conclude(const PoseBelief& belief, bool trusted, double contour_support) {
+  if (!observed_) {
+    // What hides the contour may leave enough of the texture.
+    if (contour_support < kHiddenContour) wait_ = std::min(wait_, 1);
+    return;
+  }
   const FeatureSupport support = measurement_.support(belief.pose);
-  if (method_ == Measurement::kAuto) keepWatch(support);
+  if (missing(belief.pose, support))
+    wait_ = 0;
+  else
+    keepWatch(support, contour_support);
   if (!trusted) return;
+  refusals_ = 0;
+  if (unsure_ && measurement_.features().size() >= kTextured && ++doubts_ > kRefusals) {
+    measurement_.landmarks().clear();
+    unsure_ = false;
+  }
+  if (unsure_) return;
   const Twist deviation = belief.poseCovariance().diagonal().cwiseMax(0).cwiseSqrt();
   measurement_.learn(belief.pose, deviation.head<3>().maxCoeff(), rotationSigma(belief));
   if (support.landmark_points >= kWorthWhile) carried_ = true;
 }
 
-void FeatureTracking::keepWatch(const FeatureSupport& support) {
+/// When to look for features next: at once while they carry the pose and have something to add, now
+/// and then while the contour says all, ever more rarely while they do not carry it.
+void FeatureTracking::keepWatch(const FeatureSupport& support, double contour_support) {
+  wait_ = 0;
   if (support.landmark_points >= kWorthWhile) {
-    active_ = true;
-    patience_ = kPatience;
+    trial_ = kTrial;
     period_ = kFirstPeriod;
-    return;
+    if (contour_support > kClearContour && !symmetry_.hasFreeAxis()) wait_ = kReminder;
+  } else if (--trial_ <= 0) {
+    wait_ = period_;
+    period_ = std::min(2 * period_, kLongestPeriod);
+    trial_ = 1;
+    if (support.surface_points >= static_cast<double>(kTextured)) trial_ = kTrial;
   }
-  if (!active_ && support.surface_points >= kTextured) {
-    active_ = true;
-    patience_ = kPatience;
-  }
-  if (active_ && --patience_ > 0) return;
-  active_ = false;
-  wait_ = period_;
-  period_ = std::min(2 * period_, kLongestPeriod);
 }
 
 /// Orientations that look the same; a few of a free axis.
@@ -166,24 +199,43 @@ std::optional<Pose> FeatureTracking::absolute(const RectifiedStereoFrame& frame,
                                               const std::array<cv::Rect, 2>& regions,
                                               const Pose& found) {
   if (!usable(frame) || measurement_.landmarks().landmarks().empty()) return std::nullopt;
+  struct Candidate {
+    Pose pose;
+    double landmarks = 0;
+  };
+  std::vector<Candidate> candidates;
+  PosePrior prior;
+  prior.information.diagonal() << Eigen::Vector3d::Constant(1 / (kFoundSigma * kFoundSigma)),
+      Eigen::Vector3d::Constant(1 / (kFoundTurn * kFoundTurn));
   // Descriptors depend on how the camera is rolled against the views that landmarks were learnt in.
-  std::vector<double> rolls;
-  for (const Pose& pose : equivalents(found)) {
-    const double roll = measurement_.landmarks().rollOf(pose.linear());
-    const bool known = std::any_of(rolls.begin(), rolls.end(), [&](double other) {
-      return std::abs(std::remainder(roll - other, 2 * M_PI)) < kSameRoll;
+  std::vector<Pose> left = equivalents(found);
+  while (!left.empty()) {
+    const double roll = measurement_.landmarks().rollOf(left.front().linear());
+    measurement_.observe(frame, regions, left.front(), kFoundSigma);
+    const auto rest = std::stable_partition(left.begin(), left.end(), [&](const Pose& pose) {
+      const double other = measurement_.landmarks().rollOf(pose.linear());
+      return std::abs(std::remainder(other - roll, 2 * M_PI)) < kSameRoll;
     });
-    if (known) continue;
-    rolls.push_back(roll);
-    measurement_.observe(frame, regions, pose, kFoundSigma);
-    const std::optional<Pose> located = measurement_.locate();
-    if (!located) continue;
-    const Pose equivalent = nearestEquivalent(found, *located, symmetry_);
-    if ((located->translation() - found.translation()).norm() < kSamePlace &&
-        angleBetween(located->linear(), equivalent.linear()) < kSameRotation)
-      return equivalent;
+    for (auto pose = left.begin(); pose != rest; ++pose) {
+      measurement_.expect(*pose, kFoundSigma);
+      prior.mean = *pose;
+      const Pose refined = measurement_.refine(prior).mean;
+      candidates.push_back({refined, measurement_.support(refined).landmark_points});
+    }
+    left.erase(left.begin(), rest);
   }
-  return std::nullopt;
+  const auto most = [](const Candidate& a, const Candidate& b) {
+    return a.landmarks < b.landmarks;
+  };
+  const Candidate best = *std::max_element(candidates.begin(), candidates.end(), most);
+  if (best.landmarks < kWorthWhile) return std::nullopt;
+  const bool clear = std::all_of(candidates.begin(), candidates.end(), [&](const Candidate& other) {
+    return angleBetween(other.pose.linear(), best.pose.linear()) < kSameRotation ||
+           other.landmarks < kClearlyFewer * best.landmarks;
+  });
+  if (!clear) return std::nullopt;
+  unsure_ = false;
+  return nearestEquivalent(found, best.pose, symmetry_);
 }
 
 }  // namespace leap_object_tracker

@@ -40,6 +40,8 @@ constexpr double kFoundSupport = 0.6;        // share of the contour that a foun
 constexpr double kLandmarkSupport = 0.6;     // FeatureTracking::support to stand by a pose
 constexpr float kOutsideVolume = 1000;       // [nats] against a pose outside the working volume
 constexpr int kNearFrames = 30;  // for which a lost object is looked for near its last pose
+constexpr double kRecallPositionSigma = 0.01;  // [m]
+constexpr double kRecallRotationSigma = 0.3;   // [rad]
 constexpr double kFoundPositionSigma = 0.003;  // [m]
 constexpr double kFoundRotationSigma = 0.05;   // [rad]
 
@@ -86,12 +88,14 @@ class Tracker::Impl {
     fresh_ = true;
     confirming_ = false;
     last_seen_.reset();
+    remembered_.reset();
     last_stamp_.reset();
-    features_.restart();
+    features_.restart(false);
   }
 
   void search() {
     report_.state = TrackerState::kSearching;
+    remembered_.reset();
     last_stamp_.reset();
     last_seen_.reset();
     confirming_ = false;
@@ -135,7 +139,7 @@ class Tracker::Impl {
 
     auto started = Clock::now();
     std::array<cv::Rect, 2> where = regions(belief_);
-    if (fresh_ && !confirming_) {
+    if (features_.unsure()) {
       if (const auto known = features_.absolute(frame, where, belief_.pose))
         belief_.pose = *known, initializeFilter();
     }
@@ -164,6 +168,10 @@ class Tracker::Impl {
   void lookFor(const RectifiedStereoFrame& frame, const Pose& camera_motion) {
     const auto started = Clock::now();
     if (last_seen_) last_seen_ = camera_motion * *last_seen_;
+    if (recall(frame, camera_motion)) {
+      report_.search_ms = millisecondsSince(started);
+      return;
+    }
     const std::optional<RefinedPose> found = search_.find(frame, last_seen_);
     report_.search_ms = millisecondsSince(started);
     report_.support = found ? found->support() : 0;
@@ -174,13 +182,30 @@ class Tracker::Impl {
     }
     Pose pose = found->camera_from_object;
     if (last_seen_) pose = nearestEquivalent(pose, *last_seen_, object_.symmetry);
-    belief_ = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
-    features_.restart();
-    if (const auto known = features_.absolute(frame, regions(belief_), pose)) belief_.pose = *known;
-    initializeFilter();
+    const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
+    const std::optional<Pose> known = features_.absolute(frame, regions(belief), pose);
+    if (!known && features_.refuse(pose)) return;
+    takeUp(known.value_or(pose), frame.stamp, known.has_value());
     appearance_ = {};
     appearance_.bright_inside = std::clamp(found->bright_inside, 0.3, 0.9);
-    last_stamp_ = frame.stamp;
+  }
+
+  /// Looks for landmarks where the object was last, whatever hides its contour.
+  bool recall(const RectifiedStereoFrame& frame, const Pose& camera_motion) {
+    if (!remembered_) return false;
+    remembered_ = camera_motion * *remembered_;
+    const PoseBelief belief = beliefAt(*remembered_, kRecallPositionSigma, kRecallRotationSigma);
+    const std::optional<Pose> known = features_.recall(frame, regions(belief), belief.pose);
+    if (known) takeUp(*known, frame.stamp, true);
+    return known.has_value();
+  }
+
+  /// A pose that must prove itself in the next frame.
+  void takeUp(const Pose& pose, Stamp stamp, bool sure) {
+    belief_ = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
+    initializeFilter();
+    features_.restart(sure);
+    last_stamp_ = stamp;
     weak_frames_ = 0;
     fresh_ = true;
     confirming_ = true;
@@ -393,25 +418,26 @@ class Tracker::Impl {
     const double landmark_support = features_.support(refined.camera_from_object);
     report_.support = features_.alone() ? landmark_support : refined.support();
     const bool supported =
-        report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
-        (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_);
+        !features_.contradict(refined.camera_from_object, report_.support) &&
+        (report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
+         (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_));
     if (confirming_) {
       confirming_ = false;
       frames_lost_ = 0;
-      if (report_.support < kFoundSupport) return;
+      if (report_.support < kFoundSupport && landmark_support < kLandmarkSupport) return;
     }
     if (supported) {
       belief_.update(refined.camera_from_object, refined.information);
       if (!features_.alone() && report_.support > kLearningSupport)
         refiner_.learn(model_, measurement_.fields(), belief_.pose, appearance_);
       weak_frames_ = 0;
-      last_seen_ = belief_.pose;
+      last_seen_ = remembered_ = belief_.pose;
       report_.state = TrackerState::kTracking;
     } else if (++weak_frames_ >= kPatience) {
       report_.state = TrackerState::kLost;
       frames_lost_ = 0;
     }
-    features_.conclude(belief_, supported);
+    features_.conclude(belief_, supported, refined.support());
     fresh_ = false;
     filter_.resample(params_.filter.resample_below);
     if (supported)
@@ -432,8 +458,9 @@ class Tracker::Impl {
   int weak_frames_ = 0;
   int frames_lost_ = 0;
   bool fresh_ = false;
-  bool confirming_ = false;        ///< the last search found something
-  std::optional<Pose> last_seen_;  ///< where the object was when the tracker stood by it
+  bool confirming_ = false;         ///< the last search found something
+  std::optional<Pose> remembered_;  ///< the same, for as long as it takes
+  std::optional<Pose> last_seen_;   ///< where the object was when the tracker stood by it
 };
 
 Tracker::Tracker(const TrackerParams& params, const ObjectModel& object,

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <opencv2/core.hpp>
+#include <opencv2/core/types.hpp>
 #include <vector>
 
 #include "leap_object_tracker/geometry/pose.hpp"
@@ -71,6 +72,8 @@ class FeatureExtractor {
   struct EyeImage {
     cv::Mat scaled;
     cv::Point2d origin;  ///< [px] image place of the pixel (0, 0)
+    cv::Mat taken;       ///< not zero where a corner is close by
+    std::vector<cv::KeyPoint> found;
     std::vector<Corner> corners;
   };
 

@@ -41,6 +41,9 @@ class FeatureMeasurement {
   void observe(const RectifiedStereoFrame& frame, const std::array<cv::Rect, 2>& regions,
                const Pose& predicted, double uncertainty);
 
+  /// Takes the last frame's features for another prediction of about the same roll.
+  void expect(const Pose& predicted, double uncertainty);
+
   /// Log-likelihood ratio of each pose against "no feature is of the object". May be called from
   /// several threads.
   void score(const ParticlePose* poses, std::size_t count, float* log_likelihood) const;

@@ -23,7 +23,12 @@ class FeatureTracking {
                   const RectifiedStereoCamera& camera);
 
   /// Another start: landmarks stay known, habits are forgotten.
-  void restart();
+  /// @param sure whether the orientation is that of the landmarks and not only one that looks alike
+  void restart(bool sure);
+
+  /// Whether orientation and landmarks may not belong together: absolute() is to be asked, and
+  /// nothing is learnt.
+  bool unsure() const { return unsure_; }
 
   /// Finds the features of a frame, if it is worth while.
   /// @param regions [px] where the object can be in each eye
@@ -45,14 +50,16 @@ class FeatureTracking {
   /// Landmarks that lie where a pose puts them, as a share of those that leave no doubt; at most 1.
   double support(const Pose& camera_from_object) const;
 
-  /// Whether what is at this pose has a texture, but not that of the object.
-  bool contradict(const Pose& camera_from_object) const;
+  /// Whether landmarks that should be seen at a pose are not there, but something else is.
+  /// @param contour_support as in RefinedPose
+  bool contradict(const Pose& camera_from_object, double contour_support) const;
 
   /// Ends a frame. Landmarks are learnt only from poses that the tracker stands by.
-  void conclude(const PoseBelief& belief, bool trusted);
+  /// @param contour_support as in RefinedPose
+  void conclude(const PoseBelief& belief, bool trusted, double contour_support);
 
   /// The equivalent of a found pose that the landmarks know, so that orientations mean the same
-  /// after the object was lost; nothing if they do not know.
+  /// after the object was lost; nothing if they do not know. From then on they are sure.
   std::optional<Pose> absolute(const RectifiedStereoFrame& frame,
                                const std::array<cv::Rect, 2>& regions, const Pose& found);
 
@@ -61,8 +68,9 @@ class FeatureTracking {
   std::optional<Pose> recall(const RectifiedStereoFrame& frame,
                              const std::array<cv::Rect, 2>& regions, const Pose& near);
 
-  /// Whether so much of this side of an object is known that it would be recognised.
-  bool wouldKnow(const Pose& camera_from_object) const;
+  /// Whether a pose that was found, and that absolute() could not confirm, is of another thing of
+  /// the same shape. After many refusals in a row the landmarks are forgotten instead.
+  bool refuse(const Pose& found);
 
   const LandmarkMap& landmarks() const { return measurement_.landmarks(); }
 
@@ -70,7 +78,9 @@ class FeatureTracking {
   double spotSigma(const PoseBelief& belief) const;
   bool usable(const RectifiedStereoFrame& frame) const;
   double rotationSigma(const PoseBelief& belief) const;
-  void keepWatch(const FeatureSupport& support);
+  bool wouldKnow(const Pose& camera_from_object) const;
+  bool missing(const Pose& camera_from_object, const FeatureSupport& support) const;
+  void keepWatch(const FeatureSupport& support, double contour_support);
   std::vector<Pose> equivalents(const Pose& pose) const;
 
   Measurement method_;
@@ -80,11 +90,13 @@ class FeatureTracking {
   FeatureMeasurement measurement_;
   bool observed_ = false;
   bool carried_ = false;
+  bool unsure_ = false;
+  int doubts_ = 0;    ///< frames with features since then
+  int refusals_ = 0;  ///< in a row
   // Of Measurement::kAuto.
-  bool active_ = false;
-  int patience_ = 0;  ///< frames that features may be silent before they are left out
-  int wait_ = 0;      ///< frames to the next trial
-  int period_ = 0;    ///< frames between trials
+  int wait_ = 0;    ///< frames until features are looked for again
+  int trial_ = 0;   ///< frames that features may yet fail to carry a pose
+  int period_ = 0;  ///< frames to leave out after that
 };
 
 }  // namespace leap_object_tracker
