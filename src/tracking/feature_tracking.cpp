@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace leap_object_tracker {
 namespace {
@@ -19,12 +20,14 @@ constexpr int kFirstPeriod = 16;        // frames
 constexpr int kLongestPeriod = 64;      // frames
 constexpr int kRefusals = 60;           // frames
 constexpr double kRecallSigma = 0.01;   // [m]
-constexpr double kSameRoll = 0.35;      // [rad] that descriptors stand
+constexpr double kSameRoll = 0.15;      // [rad] that descriptors stand
 constexpr int kFreeTurns = 12;          // tried about a free axis
 constexpr double kSameRotation = 0.35;  // [rad]
 constexpr double kFoundSigma = 0.002;   // [m]
 constexpr double kFoundTurn = 0.15;     // [rad]
-constexpr double kClearlyFewer = 0.6;   // landmarks, than those of the best
+constexpr double kVoteKept = 0.8;       // of earlier frames
+constexpr double kEnoughVotes = 15;     // landmarks of the best, all frames together
+constexpr double kClearlyFewer = 0.55;  // of the votes for the best
 
 }  // namespace
 
@@ -42,6 +45,7 @@ FeatureTracking::FeatureTracking(const TrackerParams& params, const ObjectModel&
 
 void FeatureTracking::restart(bool sure) {
   observed_ = carried_ = false;
+  votes_.clear();
   unsure_ = !sure && !measurement_.landmarks().landmarks().empty();
   doubts_ = 0;
   wait_ = 0;
@@ -121,6 +125,7 @@ bool FeatureTracking::contradict(const Pose& camera_from_object, double contour_
 }
 
 bool FeatureTracking::refuse(const Pose& found) {
+  votes_.clear();
   const std::vector<Pose> poses = equivalents(found);
   if (measurement_.features().size() < kTextured ||
       std::none_of(poses.begin(), poses.end(), [&](const Pose& pose) { return wouldKnow(pose); }))
@@ -199,43 +204,39 @@ std::optional<Pose> FeatureTracking::absolute(const RectifiedStereoFrame& frame,
                                               const std::array<cv::Rect, 2>& regions,
                                               const Pose& found) {
   if (!usable(frame) || measurement_.landmarks().landmarks().empty()) return std::nullopt;
-  struct Candidate {
-    Pose pose;
-    double landmarks = 0;
-  };
-  std::vector<Candidate> candidates;
+  const std::vector<Pose> poses = equivalents(found);
+  std::vector<Pose> refined = poses;
+  votes_.resize(poses.size(), 0);
   PosePrior prior;
   prior.information.diagonal() << Eigen::Vector3d::Constant(1 / (kFoundSigma * kFoundSigma)),
       Eigen::Vector3d::Constant(1 / (kFoundTurn * kFoundTurn));
   // Descriptors depend on how the camera is rolled against the views that landmarks were learnt in.
-  std::vector<Pose> left = equivalents(found);
+  std::vector<std::size_t> left(poses.size());
+  std::iota(left.begin(), left.end(), std::size_t{0});
   while (!left.empty()) {
-    const double roll = measurement_.landmarks().rollOf(left.front().linear());
-    measurement_.observe(frame, regions, left.front(), kFoundSigma);
-    const auto rest = std::stable_partition(left.begin(), left.end(), [&](const Pose& pose) {
-      const double other = measurement_.landmarks().rollOf(pose.linear());
+    const double roll = measurement_.landmarks().rollOf(poses[left.front()].linear());
+    measurement_.observe(frame, regions, poses[left.front()], kFoundSigma);
+    const auto rest = std::stable_partition(left.begin(), left.end(), [&](std::size_t i) {
+      const double other = measurement_.landmarks().rollOf(poses[i].linear());
       return std::abs(std::remainder(other - roll, 2 * M_PI)) < kSameRoll;
     });
-    for (auto pose = left.begin(); pose != rest; ++pose) {
-      measurement_.expect(*pose, kFoundSigma);
-      prior.mean = *pose;
-      const Pose refined = measurement_.refine(prior).mean;
-      candidates.push_back({refined, measurement_.support(refined).landmark_points});
+    for (auto i = left.begin(); i != rest; ++i) {
+      measurement_.expect(poses[*i], kFoundSigma);
+      prior.mean = poses[*i];
+      refined[*i] = measurement_.refine(prior).mean;
+      votes_[*i] = kVoteKept * votes_[*i] + measurement_.support(refined[*i]).landmark_points;
     }
     left.erase(left.begin(), rest);
   }
-  const auto most = [](const Candidate& a, const Candidate& b) {
-    return a.landmarks < b.landmarks;
-  };
-  const Candidate best = *std::max_element(candidates.begin(), candidates.end(), most);
-  if (best.landmarks < kWorthWhile) return std::nullopt;
-  const bool clear = std::all_of(candidates.begin(), candidates.end(), [&](const Candidate& other) {
-    return angleBetween(other.pose.linear(), best.pose.linear()) < kSameRotation ||
-           other.landmarks < kClearlyFewer * best.landmarks;
-  });
-  if (!clear) return std::nullopt;
+  const auto best =
+      static_cast<std::size_t>(std::max_element(votes_.begin(), votes_.end()) - votes_.begin());
+  if (votes_[best] < kEnoughVotes) return std::nullopt;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    if (votes_[i] > kClearlyFewer * votes_[best] &&
+        angleBetween(refined[i].linear(), refined[best].linear()) > kSameRotation)
+      return std::nullopt;
   unsure_ = false;
-  return nearestEquivalent(found, best.pose, symmetry_);
+  return nearestEquivalent(found, refined[best], symmetry_);
 }
 
 }  // namespace leap_object_tracker
