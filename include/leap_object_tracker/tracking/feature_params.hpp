@@ -6,8 +6,8 @@ namespace leap_object_tracker {
 
 /// The feature likelihood: corners seen by both eyes, as points in space.
 struct FeatureParams {
-  int corners = 160;               ///< most corners an eye; the strongest that keep their distance
-  double resolution = 3000;        ///< [px/m] the object is resampled to before corners are sought
+  int corners = 120;               ///< most corners an eye; the strongest that keep their distance
+  double resolution = 4000;        ///< [px/m] the object is resampled to before corners are sought
   double least_contrast = 0.02;    ///< threshold of corners as a share of the region's contrast
   double ratio = 0.90;             ///< nearest to second nearest descriptor of a match, at most
   double epipolar_distance = 1.5;  ///< [px] between the rows of a match, at most
