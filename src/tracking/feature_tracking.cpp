@@ -18,7 +18,7 @@ constexpr int kTrial = 5;               // frames
 constexpr int kReminder = 8;            // frames between looks at features that are not needed
 constexpr int kFirstPeriod = 16;        // frames
 constexpr int kLongestPeriod = 64;      // frames
-constexpr int kRefusals = 60;           // frames
+constexpr int kRefusals = 25;           // frames
 constexpr double kRecallSigma = 0.01;   // [m]
 constexpr double kSameRoll = 0.15;      // [rad] that descriptors stand
 constexpr int kFreeTurns = 12;          // tried about a free axis
@@ -27,6 +27,8 @@ constexpr double kFoundSigma = 0.002;   // [m]
 constexpr double kFoundTurn = 0.15;     // [rad]
 constexpr double kVoteKept = 0.8;       // of earlier frames
 constexpr double kEnoughVotes = 15;     // landmarks of the best, all frames together
+constexpr double kRecognised = 0.17;    // of the features, as landmarks
+constexpr double kRecalled = 10;        // landmarks
 constexpr double kClearlyFewer = 0.55;  // of the votes for the best
 
 }  // namespace
@@ -46,6 +48,7 @@ FeatureTracking::FeatureTracking(const TrackerParams& params, const ObjectModel&
 void FeatureTracking::restart(bool sure) {
   observed_ = carried_ = false;
   votes_.clear();
+  voters_ = 0;
   unsure_ = !sure && !measurement_.landmarks().landmarks().empty();
   doubts_ = 0;
   wait_ = 0;
@@ -119,19 +122,20 @@ bool FeatureTracking::missing(const Pose& camera_from_object, const FeatureSuppo
 }
 
 bool FeatureTracking::contradict(const Pose& camera_from_object, double contour_support) const {
-  return observed_ &&
+  return observed_ && !unsure_ &&
          (measurement_.features().size() >= kTextured || contour_support < kHiddenContour) &&
          missing(camera_from_object, measurement_.support(camera_from_object));
 }
 
 bool FeatureTracking::refuse(const Pose& found) {
-  votes_.clear();
   const std::vector<Pose> poses = equivalents(found);
   if (measurement_.features().size() < kTextured ||
       std::none_of(poses.begin(), poses.end(), [&](const Pose& pose) { return wouldKnow(pose); }))
     return false;
   if (++refusals_ < kRefusals) return true;
   refusals_ = 0;
+  votes_.clear();
+  voters_ = 0;
   measurement_.landmarks().clear();
   return false;
 }
@@ -141,7 +145,13 @@ std::optional<Pose> FeatureTracking::recall(const RectifiedStereoFrame& frame,
                                             const Pose& near) {
   if (!usable(frame) || !wouldKnow(near)) return std::nullopt;
   measurement_.observe(frame, regions, near, kRecallSigma);
-  return measurement_.locate();
+  const std::optional<Pose> located = measurement_.locate();
+  if (!located) return std::nullopt;
+  measurement_.expect(*located, kFoundSigma);
+  const double landmarks = measurement_.support(*located).landmark_points;
+  const auto features = static_cast<double>(measurement_.features().size());
+  if (landmarks < std::max(kRecalled, kRecognised * features)) return std::nullopt;
+  return located;
 }
 
 void FeatureTracking::conclude(const PoseBelief& belief, bool trusted, double contour_support) {
@@ -204,9 +214,12 @@ std::optional<Pose> FeatureTracking::absolute(const RectifiedStereoFrame& frame,
                                               const std::array<cv::Rect, 2>& regions,
                                               const Pose& found) {
   if (!usable(frame) || measurement_.landmarks().landmarks().empty()) return std::nullopt;
-  const std::vector<Pose> poses = equivalents(found);
+  // In the order of the frames before, so that votes add up.
+  voted_ = votes_.empty() ? found : nearestEquivalent(found, voted_, symmetry_);
+  const std::vector<Pose> poses = equivalents(voted_);
   std::vector<Pose> refined = poses;
   votes_.resize(poses.size(), 0);
+  voters_ *= kVoteKept;
   PosePrior prior;
   prior.information.diagonal() << Eigen::Vector3d::Constant(1 / (kFoundSigma * kFoundSigma)),
       Eigen::Vector3d::Constant(1 / (kFoundTurn * kFoundTurn));
@@ -216,6 +229,7 @@ std::optional<Pose> FeatureTracking::absolute(const RectifiedStereoFrame& frame,
   while (!left.empty()) {
     const double roll = measurement_.landmarks().rollOf(poses[left.front()].linear());
     measurement_.observe(frame, regions, poses[left.front()], kFoundSigma);
+    if (left.size() == poses.size()) voters_ += static_cast<double>(measurement_.features().size());
     const auto rest = std::stable_partition(left.begin(), left.end(), [&](std::size_t i) {
       const double other = measurement_.landmarks().rollOf(poses[i].linear());
       return std::abs(std::remainder(other - roll, 2 * M_PI)) < kSameRoll;
@@ -230,7 +244,7 @@ std::optional<Pose> FeatureTracking::absolute(const RectifiedStereoFrame& frame,
   }
   const auto best =
       static_cast<std::size_t>(std::max_element(votes_.begin(), votes_.end()) - votes_.begin());
-  if (votes_[best] < kEnoughVotes) return std::nullopt;
+  if (votes_[best] < std::max(kEnoughVotes, kRecognised * voters_)) return std::nullopt;
   for (std::size_t i = 0; i < poses.size(); ++i)
     if (votes_[i] > kClearlyFewer * votes_[best] &&
         angleBetween(refined[i].linear(), refined[best].linear()) > kSameRotation)

@@ -184,7 +184,7 @@ class Tracker::Impl {
     if (last_seen_) pose = nearestEquivalent(pose, *last_seen_, object_.symmetry);
     const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
     const std::optional<Pose> known = features_.absolute(frame, regions(belief), pose);
-    if (!known && features_.refuse(pose)) return;
+    if (!known && last_seen_ && features_.refuse(pose)) return;
     takeUp(known.value_or(pose), frame.stamp, known.has_value());
     appearance_ = {};
     appearance_.bright_inside = std::clamp(found->bright_inside, 0.3, 0.9);

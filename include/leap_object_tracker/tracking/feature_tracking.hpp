@@ -91,9 +91,11 @@ class FeatureTracking {
   bool observed_ = false;
   bool carried_ = false;
   bool unsure_ = false;
-  std::vector<double> votes_;  ///< landmarks for each equivalent orientation while unsure
-  int doubts_ = 0;             ///< frames with features since then
-  int refusals_ = 0;           ///< in a row
+  std::vector<double> votes_;      ///< landmarks for each equivalent orientation while unsure
+  Pose voted_ = Pose::Identity();  ///< the one of them that was found last
+  double voters_ = 0;              ///< features that could have voted
+  int doubts_ = 0;                 ///< frames with features since then
+  int refusals_ = 0;               ///< in a row
   // Of Measurement::kAuto.
   int wait_ = 0;    ///< frames until features are looked for again
   int trial_ = 0;   ///< frames that features may yet fail to carry a pose
