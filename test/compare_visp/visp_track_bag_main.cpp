@@ -115,13 +115,14 @@ void writeCao(const ObjectModel& object, const std::string& path) {
   out << "V1\n" << std::setprecision(9);
   if (object.shape == Shape::kCylinder) {
     const double radius = object.size.x(), half = object.size.y() / 2;
-    // Axis, then a centre and two points of each rim, counter-clockwise seen from outside.
+    // Axis, then a centre and two points of each rim, clockwise seen from outside: so that
+    // ViSP takes them for visible from there.
     const std::vector<Eigen::Vector3d> points{{0, 0, -half},      {0, 0, half},
                                               {radius, 0, half},  {0, radius, half},
                                               {0, radius, -half}, {radius, 0, -half}};
     out << points.size() << '\n';
     for (const auto& point : points) write(point);
-    out << "0\n0\n0\n1\n0 1 " << radius << "\n2\n" << radius << " 1 2 3\n" << radius << " 0 4 5\n";
+    out << "0\n0\n0\n1\n0 1 " << radius << "\n2\n" << radius << " 1 3 2\n" << radius << " 0 5 4\n";
     return;
   }
   if (object.shape == Shape::kMesh)
