@@ -5,8 +5,10 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 #include "leap_object_tracker/tracking/contour_kernel.hpp"
 
@@ -15,116 +17,221 @@ namespace leap_object_tracker {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Sum of projected length times gain of one view in one eye, in grey steps times cells.
-/// @param r camera_from_object, row by row, @param t its translation in the frame of this eye
-float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, std::size_t scored,
-                const float* HWY_RESTRICT r, const float* HWY_RESTRICT t, const EyeView& eye) {
-  const hn::ScalableTag<float> df;
-  const hn::RebindToSigned<decltype(df)> di;
-  const std::size_t lanes = hn::Lanes(df);
+constexpr std::size_t kBlock = 128;  // points at a time: what is kept of them fits the L1 cache
+constexpr float kRounder = 0x1p23F;  // a float this large has no fraction: adding it rounds
 
-  const GainMap& map = *eye.map;
-  const auto focal = hn::Set(df, eye.focal_length * map.cells_per_pixel);
-  const auto shift_u = hn::Set(df, (eye.center_u - map.origin_u) * map.cells_per_pixel + 0.5F);
-  const auto shift_v = hn::Set(df, (eye.center_v - map.origin_v) * map.cells_per_pixel + 0.5F);
-  const auto last_u = hn::Set(df, static_cast<float>(map.width) - 0.5F);
-  const auto last_v = hn::Set(df, static_cast<float>(map.height) - 0.5F);
-  const auto row_stride = hn::Set(di, map.row_stride);
-  const auto plane_stride = hn::Set(di, map.plane_stride);
-  const auto nearest = hn::Set(df, 0.01F);
-  const auto zero = hn::Zero(df), one = hn::Set(df, 1.0F);
-  // Limits between the directions: tan of 11.25, 33.75, 56.25, 78.75 deg.
-  const auto limit_1 = hn::Set(df, 0.19891237F), limit_2 = hn::Set(df, 0.66817864F);
-  const auto limit_3 = hn::Set(df, 1.49660576F), limit_4 = hn::Set(df, 5.02733949F);
-  const auto minus_one = hn::Set(di, -1), eight = hn::Set(di, 8), seven = hn::Set(di, 7);
-  const auto byte = hn::Set(di, 255);
-  const auto* base = reinterpret_cast<const std::int32_t*>(map.first());
+/// What stays the same for all poses of a batch.
+struct Eye {
+  const std::uint8_t* cells;    ///< cell (0, 0) of plane 0
+  float focal_length;           ///< [cells]
+  float center_u, center_v;     ///< [cells]
+  std::int32_t last_u, last_v;  ///< the last cell, as the bits of kRounder + cell
+  std::int32_t row, plane;      ///< [bytes]
+  std::int32_t origin;          ///< [bytes] what those bits add to an offset, negative
+  float x;                      ///< [m]
+  float scale;                  ///< nats of one grey step along a cell
+};
 
-  const auto r0 = hn::Set(df, r[0]), r1 = hn::Set(df, r[1]), r2 = hn::Set(df, r[2]);
-  const auto r3 = hn::Set(df, r[3]), r4 = hn::Set(df, r[4]), r5 = hn::Set(df, r[5]);
-  const auto r6 = hn::Set(df, r[6]), r7 = hn::Set(df, r[7]), r8 = hn::Set(df, r[8]);
-  const auto t0 = hn::Set(df, t[0]), t1 = hn::Set(df, t[1]), t2 = hn::Set(df, t[2]);
-
-  auto sum = hn::Zero(df);
-  for (std::size_t i = 0; i < scored; i += lanes) {
-    const auto x = hn::LoadU(df, arrays + i);
-    const auto y = hn::LoadU(df, arrays + points + i);
-    const auto z = hn::LoadU(df, arrays + 2 * points + i);
-    const auto a = hn::LoadU(df, arrays + 3 * points + i);
-    const auto b = hn::LoadU(df, arrays + 4 * points + i);
-    const auto c = hn::LoadU(df, arrays + 5 * points + i);
-    const auto depth = hn::MulAdd(r6, x, hn::MulAdd(r7, y, hn::MulAdd(r8, z, t2)));
-    const auto in_front = hn::Gt(depth, nearest);
-    const auto inverse = hn::Div(one, hn::Max(depth, nearest));
-    const auto slope_x =
-        hn::Mul(hn::MulAdd(r0, x, hn::MulAdd(r1, y, hn::MulAdd(r2, z, t0))), inverse);
-    const auto slope_y =
-        hn::Mul(hn::MulAdd(r3, x, hn::MulAdd(r4, y, hn::MulAdd(r5, z, t1))), inverse);
-
-    // Tangent times length, projected: d(X/Z) = (dX - X/Z dZ) / Z.
-    const auto along_x = hn::MulAdd(r0, a, hn::MulAdd(r1, b, hn::Mul(r2, c)));
-    const auto along_y = hn::MulAdd(r3, a, hn::MulAdd(r4, b, hn::Mul(r5, c)));
-    const auto along_z = hn::MulAdd(r6, a, hn::MulAdd(r7, b, hn::Mul(r8, c)));
-    const auto scale = hn::Mul(focal, inverse);
-    const auto du = hn::Mul(hn::NegMulAdd(slope_x, along_z, along_x), scale);
-    const auto dv = hn::Mul(hn::NegMulAdd(slope_y, along_z, along_y), scale);
-    const auto size_u = hn::Abs(du), size_v = hn::Abs(dv);
-    const auto length = hn::Sqrt(hn::MulAdd(du, du, hn::Mul(dv, dv)));
-
-    // Direction of the tangent in steps of 22.5 deg, 0 to 7.
-    auto steps =
-        hn::IfThenElseZero(hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_1, size_u))), minus_one);
-    steps = hn::Add(
-        steps, hn::VecFromMask(di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_2, size_u)))));
-    steps = hn::Add(
-        steps, hn::VecFromMask(di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_3, size_u)))));
-    steps = hn::Add(
-        steps, hn::VecFromMask(di, hn::RebindMask(di, hn::Gt(size_v, hn::Mul(limit_4, size_u)))));
-    const auto falling = hn::RebindMask(di, hn::Lt(hn::Mul(du, dv), zero));
-    const auto plane = hn::And(
-        hn::IfThenElse(falling, hn::Add(eight, steps), hn::Sub(hn::Zero(di), steps)), seven);
-
-    const auto column =
-        hn::ConvertTo(di, hn::Min(hn::Max(hn::MulAdd(focal, slope_x, shift_u), zero), last_u));
-    const auto row =
-        hn::ConvertTo(di, hn::Min(hn::Max(hn::MulAdd(focal, slope_y, shift_v), zero), last_v));
-    const auto offset =
-        hn::Add(hn::Add(hn::Mul(plane, plane_stride), hn::Mul(row, row_stride)), column);
-    const auto gain = hn::And(hn::GatherOffset(di, base, offset), byte);
-    const auto centred =
-        hn::Sub(hn::ConvertTo(df, gain), hn::Set(df, static_cast<float>(GainMap::kZero)));
-    sum = hn::MulAdd(hn::IfThenElseZero(in_front, length), centred, sum);
-  }
-  return hn::GetLane(hn::SumOfLanes(df, sum));
+Eye prepared(const EyeView& view, float independent_share) {
+  const GainMap& map = *view.map;
+  const auto bits = [](int cell) {
+    const float value = kRounder + static_cast<float>(cell);
+    std::int32_t result;
+    std::memcpy(&result, &value, sizeof result);
+    return result;
+  };
+  const auto zero = static_cast<std::uint32_t>(bits(0));
+  return {map.first(),
+          view.focal_length * map.cells_per_pixel,
+          (view.center_u - map.origin_u) * map.cells_per_pixel,
+          (view.center_v - map.origin_v) * map.cells_per_pixel,
+          bits(map.width - 1),
+          bits(map.height - 1),
+          map.row_stride,
+          map.plane_stride,
+          static_cast<std::int32_t>(-zero * (1 + static_cast<std::uint32_t>(map.row_stride))),
+          view.eye_x,
+          map.nats_per_step / map.cells_per_pixel * independent_share};
 }
 
-void scorePoses(const ContourModel& model, std::size_t points, const EyeView* eyes,
-                std::size_t eye_count, float independent_share, const ParticlePose* poses,
-                std::size_t count, float* log_likelihood) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const float* r = poses[i].rotation.data();
-    float total = 0;
-    for (std::size_t e = 0; e < eye_count; ++e) {
-      const EyeView& eye = eyes[e];
-      if (eye.map == nullptr) continue;
-      const float t[3] = {poses[i].translation[0] - eye.eye_x, poses[i].translation[1],
-                          poses[i].translation[2]};
-      const Eigen::Vector3f place(-(r[0] * t[0] + r[3] * t[1] + r[6] * t[2]),
-                                  -(r[1] * t[0] + r[4] * t[1] + r[7] * t[2]),
-                                  -(r[2] * t[0] + r[5] * t[1] + r[8] * t[2]));
-      const ViewChoice choice = model.choose(place);
-      if (choice.view == nullptr || choice.view->arrays.empty()) continue;
-      float turned[9];
-      for (int k = 0; k < 9; k += 3) {
-        turned[k] = choice.cosine * r[k] + choice.sine * r[k + 1];
-        turned[k + 1] = choice.cosine * r[k + 1] - choice.sine * r[k];
-        turned[k + 2] = r[k + 2];
-      }
-      const float sum = scoreView(choice.view->arrays.data(),
-                                  static_cast<std::size_t>(model.points()), points, turned, t, eye);
-      total += sum * eye.map->nats_per_step / eye.map->cells_per_pixel;
+/// What the contour points of a block look up in one eye, and what it counts.
+struct Lookups {
+  HWY_ALIGN std::uint32_t offsets[kBlock];  ///< [bytes] from cell (0, 0) of plane 0
+  HWY_ALIGN float weights[kBlock];          ///< [cells] projected length
+  HWY_ALIGN std::uint8_t gains[kBlock];
+};
+
+/// @param u, v place of points [cells], kRounder added
+/// @param du, dv their tangents times their lengths [cells], times the depth
+/// @param limits |dv| over the tangents of 11.25, 33.75, 56.25, 78.75 deg: where |du| is less, the
+///        direction is beyond that angle
+/// @param weight 1 / depth, zero for points that do not count
+template <class D, class V>
+HWY_INLINE void addLookups(D df, const Eye& eye, V u, V v, V du, V dv, V limit_1, V limit_2,
+                           V limit_3, V limit_4, V weight, Lookups& lookups, std::size_t at) {
+  const hn::RebindToSigned<D> di;
+  hn::Store(hn::Mul(hn::Sqrt(hn::MulAdd(du, du, hn::Mul(dv, dv))), weight), df,
+            lookups.weights + at);
+
+  // Direction of the tangent in steps of 22.5 deg, 0 to 7.
+  const auto size_u = hn::Abs(du);
+  const auto one = hn::Set(di, 1);
+  auto steps = hn::IfThenElseZero(hn::RebindMask(di, hn::Lt(size_u, limit_1)), one);
+  steps = hn::IfThenElse(hn::RebindMask(di, hn::Lt(size_u, limit_2)), hn::Add(steps, one), steps);
+  steps = hn::IfThenElse(hn::RebindMask(di, hn::Lt(size_u, limit_3)), hn::Add(steps, one), steps);
+  steps = hn::IfThenElse(hn::RebindMask(di, hn::Lt(size_u, limit_4)), hn::Add(steps, one), steps);
+  const auto falls = hn::ShiftRight<31>(hn::BitCast(di, hn::Xor(du, dv)));  // all bits or none
+  steps = hn::Sub(hn::Xor(steps, falls), falls);
+  const auto plane = hn::And(steps, hn::Set(di, 7));
+
+  // Compared as integers, floats that are no numbers are bounded as well.
+  const auto zero = hn::BitCast(di, hn::Set(df, kRounder));
+  const auto column = hn::Min(hn::Max(hn::BitCast(di, u), zero), hn::Set(di, eye.last_u));
+  const auto row = hn::Min(hn::Max(hn::BitCast(di, v), zero), hn::Set(di, eye.last_v));
+  const auto in_plane =
+      hn::Add(hn::Mul(row, hn::Set(di, eye.row)), hn::Add(column, hn::Set(di, eye.origin)));
+  const hn::RebindToUnsigned<D> du32;
+  hn::Store(hn::BitCast(du32, hn::Add(hn::Mul(plane, hn::Set(di, eye.plane)), in_plane)), du32,
+            lookups.offsets + at);
+}
+
+/// One by one, the loads overtake the gather instructions of most processors.
+HWY_INLINE void lookUp(const Eye& eye, std::size_t count, Lookups& lookups) {
+#pragma GCC unroll 16
+  for (std::size_t i = 0; i < count; ++i) lookups.gains[i] = eye.cells[lookups.offsets[i]];
+}
+
+/// Adds length times gain [cells, grey steps].
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V sumUp(D df, const Lookups& lookups, std::size_t count) {
+  const hn::RebindToSigned<D> di;
+  const hn::Rebind<std::uint8_t, D> bytes;
+  const auto none = hn::Set(df, static_cast<float>(GainMap::kZero));
+  auto sum = hn::Zero(df);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
+    const auto gain = hn::ConvertTo(df, hn::PromoteTo(di, hn::Load(bytes, lookups.gains + i)));
+    sum = hn::MulAdd(hn::Load(df, lookups.weights + i), hn::Sub(gain, none), sum);
+  }
+  return sum;
+}
+
+/// Log-likelihood of one view in one eye or, if both see the same view by the same focal length in
+/// cells, in two: depths and rows of the contour are then the same, and its columns differ by the
+/// baseline over the depth.
+/// @param r, t rotation, row by row, and translation of camera_from_object
+template <bool kStereo>
+float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, std::size_t scored,
+                const std::array<float, 9>& r, const std::array<float, 3>& t, const Eye& first,
+                const Eye& second) {
+  const hn::ScalableTag<float> df;
+  // Rows of the projection to cells: u = (row_u * point) / (row_z * point).
+  const auto row = [&](std::size_t k, std::size_t from, float focal, float center)
+                       HWY_ATTR { return hn::Set(df, focal * r[from + k] + center * r[6 + k]); };
+  const float focal = first.focal_length, center_u = first.center_u, center_v = first.center_v;
+  const auto u0 = row(0, 0, focal, center_u), u1 = row(1, 0, focal, center_u);
+  const auto u2 = row(2, 0, focal, center_u),
+             u3 = hn::Set(df, focal * (t[0] - first.x) + center_u * t[2]);
+  const auto v0 = row(0, 3, focal, center_v), v1 = row(1, 3, focal, center_v);
+  const auto v2 = row(2, 3, focal, center_v), v3 = hn::Set(df, focal * t[1] + center_v * t[2]);
+  const auto z0 = hn::Set(df, r[6]), z1 = hn::Set(df, r[7]), z2 = hn::Set(df, r[8]);
+  const auto z3 = hn::Set(df, t[2]);
+  const auto disparity = hn::Set(df, focal * (first.x - second.x));  // times the depth
+  const auto shift_u = hn::Set(df, second.center_u - center_u);
+  const auto shift_v = hn::Set(df, second.center_v - center_v);
+  const auto nearest = hn::Set(df, 0.01F), two = hn::Set(df, 2.0F), rounder = hn::Set(df, kRounder);
+
+  auto total = hn::Zero(df);
+  Lookups first_lookups, second_lookups;
+  for (std::size_t begin = 0; begin < scored; begin += kBlock) {
+    const std::size_t count = std::min(kBlock, scored - begin);
+    for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
+      const float* at = arrays + begin + i;
+      const auto x = hn::LoadU(df, at), y = hn::LoadU(df, at + points);
+      const auto z = hn::LoadU(df, at + 2 * points);
+      const auto depth = hn::MulAdd(z0, x, hn::MulAdd(z1, y, hn::MulAdd(z2, z, z3)));
+      const auto bounded = hn::Max(depth, nearest);
+      const auto guess = hn::ApproximateReciprocal(bounded);
+      const auto inverse = hn::Mul(guess, hn::NegMulAdd(bounded, guess, two));  // Newton's step
+      const auto weight = hn::IfThenElseZero(hn::Gt(depth, nearest), inverse);
+      const auto u = hn::Mul(hn::MulAdd(u0, x, hn::MulAdd(u1, y, hn::MulAdd(u2, z, u3))), inverse);
+      const auto v = hn::Mul(hn::MulAdd(v0, x, hn::MulAdd(v1, y, hn::MulAdd(v2, z, v3))), inverse);
+
+      // Tangent times length, projected: d(U/Z) = (dU - U/Z dZ) / Z.
+      const auto a = hn::LoadU(df, at + 3 * points), b = hn::LoadU(df, at + 4 * points);
+      const auto c = hn::LoadU(df, at + 5 * points);
+      const auto along_u = hn::MulAdd(u0, a, hn::MulAdd(u1, b, hn::Mul(u2, c)));
+      const auto along_v = hn::MulAdd(v0, a, hn::MulAdd(v1, b, hn::Mul(v2, c)));
+      const auto along_z = hn::MulAdd(z0, a, hn::MulAdd(z1, b, hn::Mul(z2, c)));
+      const auto dv = hn::NegMulAdd(v, along_z, along_v), size_v = hn::Abs(dv);
+      const auto limit_1 = hn::Mul(size_v, hn::Set(df, 1 / 0.19891237F));
+      const auto limit_2 = hn::Mul(size_v, hn::Set(df, 1 / 0.66817864F));
+      const auto limit_3 = hn::Mul(size_v, hn::Set(df, 1 / 1.49660576F));
+      const auto limit_4 = hn::Mul(size_v, hn::Set(df, 1 / 5.02733949F));
+
+      addLookups(df, first, hn::Add(u, rounder), hn::Add(v, rounder),
+                 hn::NegMulAdd(u, along_z, along_u), dv, limit_1, limit_2, limit_3, limit_4, weight,
+                 first_lookups, i);
+      if (!kStereo) continue;
+      const auto moved = hn::MulAdd(disparity, inverse, u);
+      addLookups(df, second, hn::Add(hn::Add(moved, shift_u), rounder),
+                 hn::Add(hn::Add(v, shift_v), rounder), hn::NegMulAdd(moved, along_z, along_u), dv,
+                 limit_1, limit_2, limit_3, limit_4, weight, second_lookups, i);
     }
-    log_likelihood[i] = std::isfinite(total) ? total * independent_share : 0.0F;
+    // All loads before the first sum: bytes just written are slow to be read as one vector.
+    lookUp(first, count, first_lookups);
+    if (kStereo) lookUp(second, count, second_lookups);
+    total = hn::MulAdd(hn::Set(df, first.scale), sumUp(df, first_lookups, count), total);
+    if (kStereo)
+      total = hn::MulAdd(hn::Set(df, second.scale), sumUp(df, second_lookups, count), total);
+  }
+  return hn::GetLane(hn::SumOfLanes(df, total));
+}
+
+/// The pose turned about the object's z axis, as the choice wants it.
+std::array<float, 9> turned(const std::array<float, 9>& r, const ViewChoice& choice) {
+  std::array<float, 9> result;
+  for (std::size_t k = 0; k < 9; k += 3) {
+    result[k] = choice.cosine * r[k] + choice.sine * r[k + 1];
+    result[k + 1] = choice.cosine * r[k + 1] - choice.sine * r[k];
+    result[k + 2] = r[k + 2];
+  }
+  return result;
+}
+
+void scorePoses(const ContourModel& model, std::size_t points, const EyeView* views,
+                std::size_t view_count, float independent_share, const ParticlePose* poses,
+                std::size_t count, float* log_likelihood) {
+  std::array<Eye, 2> eyes{};
+  std::size_t eye_count = 0;
+  for (std::size_t i = 0; i < std::min<std::size_t>(view_count, eyes.size()); ++i)
+    if (views[i].map != nullptr) eyes[eye_count++] = prepared(views[i], independent_share);
+  const auto entries = static_cast<std::size_t>(model.points());
+
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::array<float, 9>& r = poses[i].rotation;
+    const std::array<float, 3>& t = poses[i].translation;
+    const float y = t[1], z = t[2];
+    std::array<ViewChoice, 2> choices;
+    for (std::size_t e = 0; e < eye_count; ++e) {
+      const float x = t[0] - eyes[e].x;
+      choices[e] =
+          model.choose({-(r[0] * x + r[3] * y + r[6] * z), -(r[1] * x + r[4] * y + r[7] * z),
+                        -(r[2] * x + r[5] * y + r[8] * z)});
+      if (choices[e].view != nullptr && choices[e].view->arrays.empty()) choices[e].view = nullptr;
+    }
+    float total = 0;
+    if (choices[0].view != nullptr && choices[0].view == choices[1].view &&
+        eyes[0].focal_length == eyes[1].focal_length && choices[0].cosine == choices[1].cosine &&
+        choices[0].sine == choices[1].sine) {
+      total = scoreView<true>(choices[0].view->arrays.data(), entries, points,
+                              turned(r, choices[0]), t, eyes[0], eyes[1]);
+    } else {
+      for (std::size_t e = 0; e < eye_count; ++e)
+        if (choices[e].view != nullptr)
+          total += scoreView<false>(choices[e].view->arrays.data(), entries, points,
+                                    turned(r, choices[e]), t, eyes[e], eyes[e]);
+    }
+    log_likelihood[i] = std::isfinite(total) ? total : 0.0F;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace leap_object_tracker {
@@ -9,6 +10,7 @@ namespace {
 
 constexpr std::array<float, 2> kSigma = {3.0F, 1.2F};  // [cells] blunt, sharp
 constexpr int kMostCells = 160 * 160;          // of a gain map; larger regions get larger cells
+constexpr int kBluntPoints = 32;               // that tell as much of a blunt likelihood as more
 constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 
 /// log(p(d = 0 | edge of the object) / p(any d | no edge of it)) of a Gaussian of the distance with
@@ -53,8 +55,11 @@ void ContourMeasurement::score(const ContourModel& model, Sharpness sharpness,
     eyes[eye].center_v = static_cast<float>(camera_.center_v);
     eyes[eye].eye_x = eye == 0 ? 0 : static_cast<float>(camera_.baseline);
   }
-  scoreContours(model, model.points(), eyes.data(), eyes.size(), kIndependentShare, poses, count,
-                log_likelihood);
+  const int points =
+      sharpness == Sharpness::kBlunt ? std::min(kBluntPoints, model.points()) : model.points();
+  const float share =
+      kIndependentShare * static_cast<float>(model.points()) / static_cast<float>(points);
+  scoreContours(model, points, eyes.data(), eyes.size(), share, poses, count, log_likelihood);
 }
 
 }  // namespace leap_object_tracker

@@ -1,74 +1,41 @@
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "leap_object_tracker/tracking/particle_kernels.hpp"
 #include "tracking/random.hpp"
 
 namespace leap_object_tracker {
 namespace {
 
-constexpr std::size_t kGrain = 128;
+constexpr std::size_t kGrain = 256;
+constexpr std::size_t kSample = 4096;  // particles that the power of a layer is chosen by, at most
 
+/// Calls body(first, count) for pieces of a set, the same ones whatever the number of threads.
 template <class Body>
-void forEach(std::size_t count, const Body& body) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
-                    });
+void forPieces(std::size_t count, const Body& body) {
+  tbb::parallel_for(std::size_t{0}, (count + kGrain - 1) / kGrain, [&](std::size_t piece) {
+    body(piece * kGrain, std::min(kGrain, count - piece * kGrain));
+  });
 }
 
-/// Moves a pose by a camera twist, in single precision (Rodrigues).
-void move(ParticlePose& pose, const std::array<float, 6>& twist) {
-  for (std::size_t k = 0; k < 3; ++k) pose.translation[k] += twist[k];
-  const float x = twist[3], y = twist[4], z = twist[5];
-  const float angle2 = x * x + y * y + z * z;
-  const float angle = std::sqrt(angle2);
-  const float s = angle > 1e-6F ? std::sin(angle) / angle : 1.0F;
-  const float c = angle > 1e-3F ? (1 - std::cos(angle)) / angle2 : 0.5F;
-  const float m[9] = {1 - c * (y * y + z * z), c * x * y - s * z,       c * x * z + s * y,
-                      c * x * y + s * z,       1 - c * (x * x + z * z), c * y * z - s * x,
-                      c * x * z - s * y,       c * y * z + s * x,       1 - c * (x * x + y * y)};
-  const std::array<float, 9> r = pose.rotation;
-  for (std::size_t row = 0; row < 3; ++row)
-    for (std::size_t column = 0; column < 3; ++column)
-      pose.rotation[3 * row + column] =
-          m[3 * row] * r[column] + m[3 * row + 1] * r[3 + column] + m[3 * row + 2] * r[6 + column];
-}
-
-/// Gram-Schmidt on the rows, against the drift of many products.
-void orthonormalize(ParticlePose& pose) {
-  float* r = pose.rotation.data();
-  const float first = 1 / std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
-  for (int k = 0; k < 3; ++k) r[k] *= first;
-  const float dot = r[0] * r[3] + r[1] * r[4] + r[2] * r[5];
-  for (int k = 0; k < 3; ++k) r[3 + k] -= dot * r[k];
-  const float second = 1 / std::sqrt(r[3] * r[3] + r[4] * r[4] + r[5] * r[5]);
-  for (int k = 0; k < 3; ++k) r[3 + k] *= second;
-  r[6] = r[1] * r[5] - r[2] * r[4];
-  r[7] = r[2] * r[3] - r[0] * r[5];
-  r[8] = r[0] * r[4] - r[1] * r[3];
-}
-
-using Matrix6f = Eigen::Matrix<float, 6, 6>;
-using Vector6f = Eigen::Matrix<float, 6, 1>;
-
-/// L with L L^T = covariance; rounding below zero counts as zero.
-Matrix6f squareRoot(const Matrix6d& covariance) {
+/// L with L L^T = covariance, row by row; rounding below zero counts as zero.
+std::array<float, 36> squareRoot(const Matrix6d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(covariance);
   const Twist deviations = solver.eigenvalues().cwiseMax(0).cwiseSqrt();
-  return (solver.eigenvectors() * deviations.asDiagonal()).cast<float>();
+  std::array<float, 36> root;
+  Eigen::Map<Eigen::Matrix<float, 6, 6, Eigen::RowMajor>>(root.data()) =
+      (solver.eigenvectors() * deviations.asDiagonal()).cast<float>();
+  return root;
 }
 
-std::array<float, 6> drawTwist(const Matrix6f& root, CounterRandom& random) {
-  const std::array<float, 6> normals = random.sixNormals();
-  const Vector6f drawn = root * Eigen::Map<const Vector6f>(normals.data());
-  std::array<float, 6> twist{};
-  Eigen::Map<Vector6f>(twist.data()) = drawn;
-  return twist;
+ParticleTwist toFloats(const Twist& twist) {
+  ParticleTwist floats;
+  Eigen::Map<Eigen::Matrix<float, 6, 1>>(floats.data()) = twist.cast<float>();
+  return floats;
 }
 
 }  // namespace
@@ -79,14 +46,30 @@ ParticleFilter::ParticleFilter(const FilterParams& params) : params_(params) {
 
 void ParticleFilter::setCount(int particles) {
   const auto count = static_cast<std::size_t>(particles);
-  const std::size_t old = particles_.size();
-  particles_.resize(count);
-  for (std::size_t i = old; i < count && old > 0; ++i) particles_[i] = particles_[i % old];
-  spare_.resize(count);
-  poses_.resize(count);
+  const std::size_t old = poses_.size();
+  if (count == old) return;
+  // Neighbours are of the same parent: a part of the set would not be like the whole.
+  spare_poses_.resize(count);
+  spare_velocities_.resize(count);
+  for (std::size_t i = 0; i < count && old > 0; ++i) {
+    spare_poses_[i] = poses_[i * old / count];
+    spare_velocities_[i] = velocities_[i * old / count];
+  }
+  poses_.swap(spare_poses_);
+  velocities_.swap(spare_velocities_);
+  spare_poses_.resize(count);
+  spare_velocities_.resize(count);
   log_likelihoods_.assign(count, 0);
-  weights_.assign(count, 1.0 / static_cast<double>(count));
+  sample_.reserve(std::min(count, kSample));
+  weights_.resize(count);
   chosen_.resize(count);
+  twist_sums_.resize((count + kGrain - 1) / kGrain);
+  weight_sums_.resize(twist_sums_.size());
+  forgetWeights();
+}
+
+void ParticleFilter::forgetWeights() {
+  std::fill(weights_.begin(), weights_.end(), 1.0F / static_cast<float>(weights_.size()));
 }
 
 void ParticleFilter::initialize(const Pose& mean, const Matrix6d& covariance, const Twist& velocity,
@@ -96,90 +79,89 @@ void ParticleFilter::initialize(const Pose& mean, const Matrix6d& covariance, co
 
 void ParticleFilter::inject(double share, const Pose& mean, const Matrix6d& covariance,
                             const Twist& velocity, const Matrix6d& velocity_covariance) {
-  const std::uint64_t stream = ++draw_;
-  const ParticlePose centre = toParticlePose(mean);
-  const Matrix6f root = squareRoot(covariance), velocity_root = squareRoot(velocity_covariance);
-  const std::size_t count = particles_.size();
+  const NormalStream of_poses{params_.seed, ++draw_}, of_velocities{params_.seed, ++draw_};
+  const ParticleGaussian gaussian{toParticlePose(mean), squareRoot(covariance), toFloats(velocity),
+                                  squareRoot(velocity_covariance)};
+  const std::size_t count = poses_.size();
   const auto replaced = static_cast<std::size_t>(share * static_cast<double>(count));
-  forEach(replaced, [&](std::size_t i) {
-    CounterRandom random(params_.seed, stream, i);
+  forPieces(replaced, [&](std::size_t first, std::size_t size) {
+    std::array<ParticlePose, kGrain> poses;
+    std::array<ParticleTwist, kGrain> velocities;
+    drawParticles(gaussian, of_poses, of_velocities, first, size, poses.data(), velocities.data());
     // Evenly strewn over the set, which systematic resampling has left in the order of its parents.
-    Particle& particle = particles_[i * count / replaced];
-    particle.pose = centre;
-    move(particle.pose, drawTwist(root, random));
-    particle.velocity = drawTwist(velocity_root, random);
-    for (std::size_t k = 0; k < 6; ++k)
-      particle.velocity[k] += static_cast<float>(velocity[static_cast<Eigen::Index>(k)]);
+    for (std::size_t i = 0; i < size; ++i) {
+      const std::size_t place = (first + i) * count / replaced;
+      poses_[place] = poses[i];
+      velocities_[place] = velocities[i];
+    }
   });
-  std::fill(weights_.begin(), weights_.end(), 1.0 / static_cast<double>(count));
+  forgetWeights();
 }
 
 void ParticleFilter::predict(const MotionParams& motion, double dt, const Pose& camera_motion) {
-  const std::uint64_t stream = ++draw_;
-  const auto step = static_cast<float>(dt);
-  const auto kept = static_cast<float>(std::exp(-motion.velocity_damping * dt));
-  const bool camera_moved = !camera_motion.isApprox(Pose::Identity(), 1e-12);
-  const Eigen::Matrix3f turn = camera_motion.linear().cast<float>();
-  const Eigen::Vector3f shift = camera_motion.translation().cast<float>();
-  using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
-  forEach(particles_.size(), [&](std::size_t i) {
-    CounterRandom random(params_.seed, stream, i);
-    Particle& particle = particles_[i];
-    if (camera_moved) {
-      Eigen::Map<RowMajor> rotation(particle.pose.rotation.data());
-      rotation = (turn * rotation).eval();
-      Eigen::Map<Eigen::Vector3f> translation(particle.pose.translation.data());
-      translation = (turn * translation + shift).eval();
-      for (const int part : {0, 3}) {
-        Eigen::Map<Eigen::Vector3f> velocity(particle.velocity.data() + part);
-        velocity = (turn * velocity).eval();
-      }
-    }
-    const std::array<float, 6> normals = random.sixNormals();
-    std::array<float, 6> twist{};
-    for (std::size_t k = 0; k < 6; ++k) {
-      const auto acceleration =
-          normals[k] *
-          static_cast<float>(k < 3 ? motion.linear_acceleration : motion.angular_acceleration);
-      twist[k] = (particle.velocity[k] + 0.5F * acceleration * step) * step;
-      particle.velocity[k] = kept * particle.velocity[k] + acceleration * step;
-    }
-    move(particle.pose, twist);
-    orthonormalize(particle.pose);
+  const NormalStream stream{params_.seed, ++draw_};
+  ParticleStep step;
+  step.seconds = static_cast<float>(dt);
+  step.kept_velocity = static_cast<float>(std::exp(-motion.velocity_damping * dt));
+  for (std::size_t k = 0; k < 6; ++k)
+    step.acceleration[k] =
+        static_cast<float>(k < 3 ? motion.linear_acceleration : motion.angular_acceleration);
+  step.camera_moved = !camera_motion.isApprox(Pose::Identity(), 1e-12);
+  const ParticlePose moved = toParticlePose(camera_motion);
+  step.turn = moved.rotation;
+  step.shift = moved.translation;
+  forPieces(poses_.size(), [&](std::size_t first, std::size_t size) {
+    predictParticles(step, stream, first, size, poses_.data() + first, velocities_.data() + first);
   });
 }
 
 void ParticleFilter::score(const BatchScorer& scorer) {
-  const std::size_t count = particles_.size();
-  for (std::size_t i = 0; i < count; ++i) poses_[i] = particles_[i].pose;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, kGrain),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      scorer(poses_.data() + range.begin(), range.size(),
-                             log_likelihoods_.data() + range.begin());
-                    });
+  forPieces(poses_.size(), [&](std::size_t first, std::size_t size) {
+    scorer(poses_.data() + first, size, log_likelihoods_.data() + first);
+  });
 }
 
 void ParticleFilter::normalizeWeights(double power) {
   const float best = *std::max_element(log_likelihoods_.begin(), log_likelihoods_.end());
+  forPieces(weights_.size(), [&](std::size_t first, std::size_t size) {
+    weight_sums_[first / kGrain] = exponentials(log_likelihoods_.data() + first, size, best,
+                                                static_cast<float>(power), weights_.data() + first);
+  });
   double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < weights_.size(); ++i) {
-    weights_[i] = std::exp(power * static_cast<double>(log_likelihoods_[i] - best));
-    sum += weights_[i];
+  for (const WeightSums& piece : weight_sums_) sum += piece.sum, squares += piece.squares;
+  const auto factor = static_cast<float>(1 / sum);
+  for (float& weight : weights_) weight *= factor;
+  effective_share_ = sum * sum / (squares * static_cast<double>(weights_.size()));
+}
+
+double ParticleFilter::powerFor(double survival) {
+  const std::size_t step = (log_likelihoods_.size() + kSample - 1) / kSample;
+  sample_.clear();
+  for (std::size_t i = 0; i < log_likelihoods_.size(); i += step)
+    sample_.push_back(log_likelihoods_[i]);
+  const float best = *std::max_element(sample_.begin(), sample_.end());
+  const auto share = [&](double power) {
+    const WeightSums sums =
+        exponentials(sample_.data(), sample_.size(), best, static_cast<float>(power), nullptr);
+    return sums.sum * sums.sum / (sums.squares * static_cast<double>(sample_.size()));
+  };
+  double low = 0, high = 1;
+  if (share(high) >= survival) return high;
+  for (int i = 0; i < 12; ++i) {
+    const double middle = 0.5 * (low + high);
+    (share(middle) < survival ? high : low) = middle;
   }
-  for (double& weight : weights_) {
-    weight /= sum;
-    squares += weight * weight;
-  }
-  effective_share_ = 1 / (squares * static_cast<double>(weights_.size()));
+  return low;
 }
 
 void ParticleFilter::drawIndices() {
   CounterRandom random(params_.seed, ++draw_, 0);
   const double step = 1.0 / static_cast<double>(weights_.size());
-  double target = random.uniform() * step, passed = weights_[0];
+  double target = random.uniform() * step, passed = static_cast<double>(weights_[0]);
   std::uint32_t source = 0;
   for (std::uint32_t& index : chosen_) {
-    while (passed < target && source + 1 < weights_.size()) passed += weights_[++source];
+    while (passed < target && source + 1 < weights_.size())
+      passed += static_cast<double>(weights_[++source]);
     index = source;
     target += step;
   }
@@ -188,54 +170,43 @@ void ParticleFilter::drawIndices() {
 void ParticleFilter::resample(double resample_below) {
   if (effective_share_ >= resample_below) return;
   drawIndices();
-  for (std::size_t i = 0; i < particles_.size(); ++i) spare_[i] = particles_[chosen_[i]];
-  particles_.swap(spare_);
-  std::fill(weights_.begin(), weights_.end(), 1.0 / static_cast<double>(weights_.size()));
+  forPieces(poses_.size(), [&](std::size_t first, std::size_t size) {
+    for (std::size_t i = first; i < first + size; ++i) {
+      spare_poses_[i] = poses_[chosen_[i]];
+      spare_velocities_[i] = velocities_[chosen_[i]];
+    }
+  });
+  poses_.swap(spare_poses_);
+  velocities_.swap(spare_velocities_);
+  forgetWeights();
 }
 
-void ParticleFilter::anneal(const BatchScorer& scorer, double survival, double spread, int layer) {
+void ParticleFilter::anneal(const BatchScorer& scorer, double survival, double spread) {
   score(scorer);
   // The power that leaves the wanted share effective (Deutscher and Reid 2005, section 4.2).
-  double low = 0, high = 1;
-  normalizeWeights(high);
-  if (effective_share_ < survival) {
-    for (int i = 0; i < 12; ++i) {
-      const double middle = 0.5 * (low + high);
-      normalizeWeights(middle);
-      (effective_share_ < survival ? high : low) = middle;
-    }
-    normalizeWeights(low);
-  }
+  normalizeWeights(powerFor(survival));
   resample(1.01);
 
-  // Spread by the deviation of the survivors, about the first of them.
-  Vector6f mean = Vector6f::Zero(), squares = Vector6f::Zero();
-  const ParticlePose reference = particles_[particles_.size() / 2].pose;
-  using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
-  const Eigen::Map<const RowMajor> reference_rotation(reference.rotation.data());
-  for (const Particle& particle : particles_) {
-    const Eigen::Map<const RowMajor> rotation(particle.pose.rotation.data());
-    const Eigen::Matrix3f turn = rotation * reference_rotation.transpose();
-    Vector6f twist;
-    for (int k = 0; k < 3; ++k)
-      twist[k] = particle.pose.translation[static_cast<std::size_t>(k)] -
-                 reference.translation[static_cast<std::size_t>(k)];
-    twist.tail<3>() << 0.5F * (turn(2, 1) - turn(1, 2)), 0.5F * (turn(0, 2) - turn(2, 0)),
-        0.5F * (turn(1, 0) - turn(0, 1));
-    mean += twist;
-    squares += twist.cwiseAbs2();
+  // Spread by the deviation of the survivors, about one of them.
+  const ParticlePose reference = poses_[poses_.size() / 2];
+  forPieces(poses_.size(), [&](std::size_t first, std::size_t size) {
+    twist_sums_[first / kGrain] = sumTwists(reference, poses_.data() + first, size);
+  });
+  const auto count = static_cast<double>(poses_.size());
+  ParticleTwist deviations;
+  for (std::size_t k = 0; k < 6; ++k) {
+    double sum = 0, squares = 0;
+    for (const TwistSums& piece : twist_sums_) {
+      sum += static_cast<double>(piece.sums[k]);
+      squares += static_cast<double>(piece.squares[k]);
+    }
+    const double mean = sum / count;
+    deviations[k] =
+        static_cast<float>(spread * std::sqrt(std::max(0.0, squares / count - mean * mean)));
   }
-  const auto count = static_cast<float>(particles_.size());
-  mean /= count;
-  const Vector6f deviation =
-      (squares / count - mean.cwiseAbs2()).cwiseMax(0).cwiseSqrt() * static_cast<float>(spread);
-  const std::uint64_t stream = ++draw_;
-  forEach(particles_.size(), [&](std::size_t i) {
-    CounterRandom random(params_.seed, stream + static_cast<std::uint64_t>(layer) * 0x100000000ULL,
-                         i);
-    std::array<float, 6> twist = random.sixNormals();
-    for (std::size_t k = 0; k < 6; ++k) twist[k] *= deviation[static_cast<Eigen::Index>(k)];
-    move(particles_[i].pose, twist);
+  const NormalStream stream{params_.seed, ++draw_};
+  forPieces(poses_.size(), [&](std::size_t first, std::size_t size) {
+    spreadParticles(deviations, stream, first, size, poses_.data() + first);
   });
 }
 

@@ -12,6 +12,7 @@
 
 #include "leap_object_tracker/tracking/contour_measurement.hpp"
 #include "leap_object_tracker/tracking/feature_tracking.hpp"
+#include "leap_object_tracker/tracking/particle_budget.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/pose_belief.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
@@ -60,6 +61,7 @@ class Tracker::Impl {
         model_(object, params.contour.points, params.contour.edge_radius,
                params.contour.cache_folder),
         filter_(params.filter),
+        budget_(params.filter),
         measurement_(params.contour, params.eyes, camera),
         refiner_(params.contour, camera),
         features_(params, object_, camera),
@@ -135,7 +137,9 @@ class Tracker::Impl {
       lookFor(frame, camera_motion);
       return std::nullopt;
     }
+    const auto begun = Clock::now();
     predict(frame.stamp, camera_motion);
+    double particles_ms = millisecondsSince(begun);
 
     auto started = Clock::now();
     std::array<cv::Rect, 2> where = regions(belief_);
@@ -151,9 +155,11 @@ class Tracker::Impl {
     filter_.inject(kDoubtShare, belief_.pose, belief_.poseCovariance() + doubt(belief_.pose),
                    belief_.velocity, belief_.velocityCovariance());
     scoreParticles();
+    particles_ms += millisecondsSince(started);
     const RefinedPose refined = features_.alone() ? refineByFeatures() : refineBest();
     takeOver(refined);
     report_.filter_ms = millisecondsSince(started);
+    budget_.record(report_.particles, particles_ms, millisecondsSince(begun) - particles_ms);
 
     if (report_.state != TrackerState::kTracking) return std::nullopt;
     PoseEstimate estimate;
@@ -229,6 +235,9 @@ class Tracker::Impl {
     if (last_stamp_) dt = std::clamp(seconds(stamp - *last_stamp_), 0.0, kLongestStep);
     last_stamp_ = stamp;
     belief_.predict(params_.motion, dt, camera_motion);
+    const Twist pixels = doubt(belief_.pose).diagonal().cwiseSqrt() / kDoubtReach;
+    filter_.setCount(
+        budget_.count(belief_.poseCovariance().diagonal().cwiseMax(0).cwiseSqrt(), 2 * pixels));
     filter_.predict(params_.motion, dt, camera_motion);
   }
 
@@ -294,10 +303,10 @@ class Tracker::Impl {
       };
     };
     for (int layer = 0; layer + 1 < params_.filter.layers; ++layer)
-      filter_.anneal(scorer(Sharpness::kBlunt), 0.2, 0.4, layer);
+      filter_.anneal(scorer(Sharpness::kBlunt), 0.2, 0.4);
     filter_.weigh(scorer(Sharpness::kSharp));
     report_.effective_share = filter_.effectiveShare();
-    report_.particles = static_cast<int>(filter_.particles().size());
+    report_.particles = static_cast<int>(filter_.poses().size());
   }
 
   /// Refines the prediction and the best particles that differ from each other; the one that
@@ -313,15 +322,15 @@ class Tracker::Impl {
     const PosePrior with_features = features_.refine(prior);
     std::vector<Pose> starts{belief_.pose};
     const auto& scores = filter_.logLikelihoods();
-    std::vector<std::uint32_t> order(scores.size());
-    std::iota(order.begin(), order.end(), 0U);
-    const std::size_t candidates = std::min<std::size_t>(order.size(), 64);
-    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(candidates),
-                      order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    order_.resize(scores.size());
+    std::iota(order_.begin(), order_.end(), 0U);
+    const std::size_t candidates = std::min<std::size_t>(order_.size(), 64);
+    std::partial_sort(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(candidates),
+                      order_.end(), [&](std::uint32_t a, std::uint32_t b) {
                         return scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
                       });
     for (std::size_t i = 0; i < candidates && starts.size() < kHypotheses; ++i) {
-      const Pose pose = toPose(filter_.particles()[order[i]].pose);
+      const Pose pose = toPose(filter_.poses()[order_[i]]);
       const bool near = std::any_of(starts.begin() + 1, starts.end(), [&](const Pose& other) {
         return (pose.translation() - other.translation()).norm() < 0.15 * model_.radius() &&
                angleBetween(pose.linear(), other.linear()) < 0.15;
@@ -386,8 +395,8 @@ class Tracker::Impl {
     const auto& scores = filter_.logLikelihoods();
     const auto best_particle = std::max_element(scores.begin(), scores.end()) - scores.begin();
     const PosePrior ahead = features_.refine(prior);
-    const PosePrior elsewhere = features_.refine(
-        prior, toPose(filter_.particles()[static_cast<std::size_t>(best_particle)].pose));
+    const PosePrior elsewhere =
+        features_.refine(prior, toPose(filter_.poses()[static_cast<std::size_t>(best_particle)]));
     const auto score = [&](const Pose& pose) {
       const Twist shift = cameraTwistBetween(prior.mean, pose);
       return features_.score(pose) - 0.5 * shift.dot(prior.information * shift);
@@ -445,6 +454,7 @@ class Tracker::Impl {
                      belief_.velocityCovariance());
   }
 
+  ParticleBudget budget_;
   ContourMeasurement measurement_;
   PoseRefiner refiner_;
   FeatureTracking features_;
@@ -455,6 +465,7 @@ class Tracker::Impl {
   std::optional<Stamp> last_stamp_;
   std::optional<Pose> last_fixed_from_camera_;
   Appearance appearance_;
+  std::vector<std::uint32_t> order_;  ///< of the particles, the best ones first
   int weak_frames_ = 0;
   int frames_lost_ = 0;
   bool fresh_ = false;
@@ -486,8 +497,8 @@ void Tracker::saveLandmarks(const std::string& path) const { impl_->saveLandmark
 std::vector<Pose> Tracker::particles() const {
   std::vector<Pose> poses;
   if (impl_->report_.state == TrackerState::kIdle) return poses;
-  poses.reserve(impl_->filter_.particles().size());
-  for (const auto& particle : impl_->filter_.particles()) poses.push_back(toPose(particle.pose));
+  poses.reserve(impl_->filter_.poses().size());
+  for (const auto& particle : impl_->filter_.poses()) poses.push_back(toPose(particle));
   return poses;
 }
 

@@ -7,6 +7,7 @@
 
 #include "leap_object_tracker/geometry/pose.hpp"
 #include "leap_object_tracker/tracking/measurement_model.hpp"
+#include "leap_object_tracker/tracking/particle_kernels.hpp"
 #include "leap_object_tracker/tracking/tracker_params.hpp"
 
 namespace leap_object_tracker {
@@ -19,11 +20,6 @@ using BatchScorer =
 /// seed, the frame and the particle only, so that the number of threads changes nothing.
 class ParticleFilter {
  public:
-  struct Particle {
-    ParticlePose pose;
-    std::array<float, 6> velocity;  ///< camera twist [m/s, rad/s]
-  };
-
   explicit ParticleFilter(const FilterParams& params);
 
   /// Draws all particles from a Gaussian of the camera twist about `mean`.
@@ -37,7 +33,7 @@ class ParticleFilter {
   /// One annealing layer (Deutscher and Reid 2005): weights by the likelihood to the power that
   /// keeps `survival` of the particles effective, resamples systematically, and spreads them by
   /// `spread` times the particles' own standard deviation.
-  void anneal(const BatchScorer& score, double survival, double spread, int layer);
+  void anneal(const BatchScorer& score, double survival, double spread);
 
   /// Weights by the likelihood, full power. Particles stay where they are.
   void weigh(const BatchScorer& score);
@@ -52,22 +48,26 @@ class ParticleFilter {
   /// Effective sample size / particles, after the last weigh().
   double effectiveShare() const { return effective_share_; }
 
-  const std::vector<Particle>& particles() const { return particles_; }
+  const std::vector<ParticlePose>& poses() const { return poses_; }
   const std::vector<float>& logLikelihoods() const { return log_likelihoods_; }
+  /// Leaves particles out, or repeats some, evenly over the set.
   void setCount(int particles);
 
  private:
   void score(const BatchScorer& scorer);
   void normalizeWeights(double power);
+  double powerFor(double survival);
+  void forgetWeights();
   void drawIndices();
 
   FilterParams params_;
   std::uint64_t draw_ = 0;  ///< number of random draws of the whole set so far
-  std::vector<Particle> particles_, spare_;
-  std::vector<ParticlePose> poses_;
-  std::vector<float> log_likelihoods_;
-  std::vector<double> weights_;
+  std::vector<ParticlePose> poses_, spare_poses_;
+  std::vector<ParticleTwist> velocities_, spare_velocities_;
+  std::vector<float> log_likelihoods_, sample_, weights_;
   std::vector<std::uint32_t> chosen_;
+  std::vector<TwistSums> twist_sums_;    ///< of pieces of the set
+  std::vector<WeightSums> weight_sums_;  ///< the same
   double effective_share_ = 1;
 };
 

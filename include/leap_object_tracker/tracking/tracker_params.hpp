@@ -26,8 +26,10 @@ struct MotionParams {
 
 /// The particle set.
 struct FilterParams {
-  int particles = 1000;         ///< scored a frame and layer
-  int layers = 2;               ///< annealing layers, from blunt to sharp likelihood
+  int particles = 1000;     ///< scored a frame and layer, at most
+  int least_particles = 0;  ///< where the pose is well known; 0: always as many
+  double budget_ms = 0;     ///< [ms] for a frame: fewer particles if it takes longer; 0: no limit
+  int layers = 2;           ///< annealing layers, from blunt to sharp likelihood
   double resample_below = 0.5;  ///< share of effective particles; 1 after every frame
   std::uint64_t seed = 1;
 };
