@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <stdexcept>
 
 #include "contour_segments.hpp"
 #include "mesh_views.hpp"
@@ -37,6 +39,16 @@ class PolyhedronTable : public ContourModel::Table {
  public:
   PolyhedronTable(const Mesh& mesh, double edge_radius, int points) {
     const std::vector<Edge> edges = findEdges(mesh, edge_radius);
+    if (faces_.size() > kMostFaces)
+      throw std::invalid_argument(
+          "contour: a polyhedron has more faces than a table of their sets");
+    for (std::size_t i = 0; i < faces_.size(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      normals_x_[k] = faces_[i].x();
+      normals_y_[k] = faces_[i].y();
+      normals_z_[k] = faces_[i].z();
+      offsets_[k] = faces_[i].w();
+    }
     const std::size_t sets = std::size_t{1} << faces_.size();
     views_.resize(sets);
     for (std::size_t visible = 1; visible < sets; ++visible)
@@ -44,9 +56,13 @@ class PolyhedronTable : public ContourModel::Table {
   }
 
   ViewChoice choose(const Eigen::Vector3f& eye) const override {
+    // Without branches: particles see this set of faces or that one, and nobody foretells which.
+    const Planes below =
+        offsets_ - normals_x_ * eye.x() - normals_y_ * eye.y() - normals_z_ * eye.z();
+    std::array<std::uint32_t, kMostFaces> bits;
+    std::memcpy(bits.data(), below.data(), sizeof bits);
     std::size_t visible = 0;
-    for (std::size_t i = 0; i < faces_.size(); ++i)
-      if (faces_[i].head<3>().dot(eye) > faces_[i].w()) visible |= std::size_t{1} << i;
+    for (std::size_t i = 0; i < kMostFaces; ++i) visible |= std::size_t{bits[i] >> 31} << i;
     return {visible == 0 ? nullptr : &views_[visible], 1, 0};
   }
 
@@ -108,7 +124,13 @@ class PolyhedronTable : public ContourModel::Table {
     return segments;
   }
 
+  static constexpr std::size_t kMostFaces = 8;
+  using Planes = Eigen::Array<float, kMostFaces, 1>;
+
   std::vector<Eigen::Vector4f> faces_;  ///< normal, offset: n * x = offset on the face
+  /// The same side by side, all faces at once; zero where there is no face.
+  Planes normals_x_ = Planes::Zero(), normals_y_ = Planes::Zero(), normals_z_ = Planes::Zero();
+  Planes offsets_ = Planes::Zero();
   std::vector<ContourView> views_;
 };
 
@@ -160,7 +182,7 @@ class CylinderTable : public ContourModel::Table {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector3d normal(std::cos(limb), side * std::sin(limb), 0);
       const Eigen::Vector3d foot = radius * normal, up(0, 0, height / 2);
-      all.push_back({foot - up, foot + up, normal, true, {}});
+      all.push_back({foot - up, foot + up, normal, true});
     }
     for (const int end : {-1, 1})
       addRim(

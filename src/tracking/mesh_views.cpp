@@ -255,11 +255,10 @@ class ContourFinder {
       faces_eye[t] = planes_[t].head<3>().dot(eye) + planes_[t].w() > 0 ? 1 : 0;
 
     std::vector<ContourSegment> segments;
-    for (const Edge& edge : edges_) {
-      bool outline = edge.kind == Kind::kOpen;
-      if (edge.kind == Kind::kSmooth || edge.kind == Kind::kSharp)
-        outline = (faces_eye[edge.triangles[0]] != faces_eye[edge.triangles[1]]) != edge.opposed;
-      if (outline || edge.kind != Kind::kSmooth) addVisible(edge, outline, eye, segments);
+    for (std::size_t i = 0; i < sides_.size(); ++i) {
+      const Sides& sides = sides_[i];
+      const bool outline = (faces_eye[sides.first] ^ faces_eye[sides.second] ^ sides.flipped) != 0;
+      if (outline || sides.always) addVisible(edges_[i], outline, eye, segments);
     }
     return segments;
   }
@@ -277,6 +276,14 @@ class ContourFinder {
     std::array<Vector3d, 2> apexes;  ///< third corners of the triangles
     Kind kind = Kind::kSmooth;
     bool opposed = false;  ///< the triangles are given in opposite turns
+  };
+
+  /// What decides whether an edge is contour, apart from the rest: all edges are asked for every
+  /// view. It is outline if one of the two triangles looks at the eye, or, if flipped, both or
+  /// none.
+  struct Sides {
+    std::uint32_t first, second;
+    bool flipped, always;
   };
 
   bool forwards(std::size_t triangle, std::uint32_t start, std::uint32_t end) const {
@@ -351,6 +358,12 @@ class ContourFinder {
     std::vector<Edge> sorted;
     for (const auto& [bits, i] : order) sorted.push_back(edges_[i]);
     edges_ = std::move(sorted);
+    for (const Edge& edge : edges_) {
+      const bool branching = edge.kind == Kind::kBranching;
+      sides_.push_back({edge.triangles[0], edge.triangles[branching ? 0 : 1],
+                        edge.kind == Kind::kOpen || (edge.opposed && !branching),
+                        edge.kind != Kind::kSmooth});
+    }
   }
 
   /// Cuts an edge into pieces short enough to be wholly visible or wholly hidden.
@@ -428,7 +441,7 @@ class ContourFinder {
     if (!(half.norm() > 1e-9 * radius_)) return;
     const Vector3d middle = (start + end) / 2;
     const Vector3d outward = normal.dot(awayInImage(edge, ray)) < 0 ? Vector3d(-normal) : normal;
-    segments.push_back({middle - half, middle + half, outward, true, {}});
+    segments.push_back({middle - half, middle + half, outward, true});
   }
 
   Mesh mesh_;
@@ -437,6 +450,7 @@ class ContourFinder {
   std::vector<Vector3d> normals_;
   std::vector<Eigen::Vector4d> planes_;
   std::vector<Edge> edges_;
+  std::vector<Sides> sides_;  ///< of each edge
 };
 
 MeshViews computeViews(const Mesh& mesh, int points) {
