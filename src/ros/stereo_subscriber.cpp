@@ -13,7 +13,7 @@ constexpr std::uint32_t kQueue = 16;
 
 }  // namespace
 
-/// Runs behind all messages that are in the callback queue already, so the newest pair is known.
+/// Runs behind all messages that are in the callback queue already, so that all pairs are known.
 class StereoSubscriber::HandOn : public ros::CallbackInterface {
  public:
   explicit HandOn(StereoSubscriber& owner) : owner_(owner) {}
@@ -100,8 +100,11 @@ void StereoSubscriber::take(Topic topic, const ros::Time& stamp, const StereoMes
   const auto pair = matcher_.add(stamp, part);
   if (!pair) return;
   ++pairs_;
-  if (newest_) ++dropped_;
-  newest_ = pair;
+  queue_.push(*pair);
+  askToHandOn();
+}
+
+void StereoSubscriber::askToHandOn() {
   if (waits_to_hand_on_) return;
   waits_to_hand_on_ = true;
   nh_.getCallbackQueue()->addCallback(boost::make_shared<HandOn>(*this),
@@ -110,10 +113,9 @@ void StereoSubscriber::take(Topic topic, const ros::Time& stamp, const StereoMes
 
 void StereoSubscriber::handOn() {
   waits_to_hand_on_ = false;
-  if (!newest_) return;
-  const StereoMessages pair = *newest_;
-  newest_.reset();
-  callback_(pair);
+  if (const auto pair = queue_.next()) callback_(*pair);
+  // Behind the messages that came meanwhile.
+  if (!queue_.empty()) askToHandOn();
 }
 
 void StereoSubscriber::watch() {

@@ -9,12 +9,13 @@
 #include <memory>
 #include <string>
 
+#include "pair_queue.hpp"
 #include "stereo_matcher.hpp"
 
 namespace leap_object_tracker {
 
-/// Subscribes to a stereo camera and hands on the newest pair of equal stamps: pairs that wait
-/// behind a newer one are dropped and counted. Says so when pairs fail to come.
+/// Subscribes to a stereo camera and hands on the pairs of equal stamps, as PairQueue does: late
+/// ones are dropped and counted. Says so when pairs fail to come.
 ///
 /// All happens in the callback queue of the node handle, which must be one that a single thread
 /// serves at a time.
@@ -37,7 +38,7 @@ class StereoSubscriber {
   bool subscribed() const { return subscribed_; }
 
   /// Pairs that gave way to newer ones.
-  std::uint32_t dropped() const { return dropped_; }
+  std::uint32_t dropped() const { return queue_.dropped(); }
 
  private:
   class HandOn;
@@ -45,6 +46,7 @@ class StereoSubscriber {
 
   bool wanted(Topic topic) const;
   void take(Topic topic, const ros::Time& stamp, const StereoMessages& part);
+  void askToHandOn();
   void handOn();
   void watch();
 
@@ -60,9 +62,8 @@ class StereoSubscriber {
   bool subscribed_ = false;
 
   StereoMatcher matcher_;
-  std::optional<StereoMessages> newest_;
+  PairQueue queue_;
   bool waits_to_hand_on_ = false;
-  std::uint32_t dropped_ = 0;
 
   ros::WallTimer watch_timer_;
   std::array<int, kTopics> received_{};
