@@ -1,6 +1,7 @@
 #include "command_line.hpp"
 
 #include <cstdlib>
+#include <iostream>
 
 namespace leap_object_tracker {
 
@@ -50,6 +51,31 @@ long long CommandLine::wholeNumber(const std::string& option, long long low, lon
     throw UsageError("--" + option + " '" + word + "' must be a whole number from " +
                      std::to_string(low) + " to " + std::to_string(high));
   return value;
+}
+
+int runProgram(const Program& program, int argc, char** argv, void (*run)(const CommandLine&)) {
+  try {
+    std::map<std::string, int> options = program.options;
+    options["help"] = 0;
+    const CommandLine line(argc, argv, options);
+    if (line.has("help"))
+      std::cout << program.usage;
+    else
+      run(line);
+    return 0;
+  } catch (const UsageError& error) {
+    std::cerr << program.name << ": " << error.what() << "\n\n" << program.usage;
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << program.name << ": " << error.what() << "\n";
+    return 1;
+  }
+}
+
+std::ofstream createFile(const std::filesystem::path& path) {
+  std::ofstream file(path);
+  if (!file) throw std::runtime_error("cannot write '" + path.string() + "'");
+  return file;
 }
 
 }  // namespace leap_object_tracker

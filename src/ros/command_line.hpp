@@ -1,5 +1,7 @@
 #pragma once
 
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -31,5 +33,19 @@ class CommandLine {
   std::vector<std::string> positional_;
   std::map<std::string, std::vector<std::string>> values_;
 };
+
+/// What a program says of itself. Each has the option --help as well.
+struct Program {
+  const char* name;
+  const char* usage;
+  std::map<std::string, int> options;
+};
+
+/// The main function of a program: runs it, or says what is wrong.
+/// @return 0, 1 after an error, 2 for a command line that is not as the usage says
+int runProgram(const Program& program, int argc, char** argv, void (*run)(const CommandLine&));
+
+/// @throw std::runtime_error naming the file, if it cannot be written.
+std::ofstream createFile(const std::filesystem::path& path);
 
 }  // namespace leap_object_tracker

@@ -39,9 +39,9 @@ Judges poses of an object against the true ones: a bag with a topic of poses, or
 )";
 
 const std::map<std::string, int> kOptions{
-    {"object", 1},    {"topic", 1},    {"names", 1},    {"covariances", 1}, {"timing", 1},
-    {"csv", 1},       {"frames", 1},   {"html", 1},     {"title", 1},       {"series", 1},
-    {"histogram", 1}, {"pictures", 1}, {"absolute", 0}, {"help", 0}};
+    {"object", 1},    {"topic", 1},    {"names", 1},   {"covariances", 1}, {"timing", 1},
+    {"csv", 1},       {"frames", 1},   {"html", 1},    {"title", 1},       {"series", 1},
+    {"histogram", 1}, {"pictures", 1}, {"absolute", 0}};
 
 using Strings = std::vector<std::string>;
 
@@ -148,12 +148,6 @@ TrajectoryReport judge(const Runs& runs, std::size_t i, const Trajectory& truth,
   return compare(estimate, truth, object, params);
 }
 
-std::ofstream create(const std::string& path) {
-  std::ofstream file(path);
-  if (!file) throw std::runtime_error("cannot write '" + path + "'");
-  return file;
-}
-
 void writeHtml(const CommandLine& line, ReportContents contents, const Runs& runs) {
   contents.title = line.text("title", "Poses against " + fs::path(runs.truth).filename().string());
   for (std::size_t i = 0; i < runs.timings.size(); ++i) {
@@ -167,12 +161,7 @@ void writeHtml(const CommandLine& line, ReportContents contents, const Runs& run
   std::cout << "\nreport: " << line.text("html") << '\n';
 }
 
-int run(int argc, char** argv) {
-  const CommandLine line(argc, argv, kOptions);
-  if (line.has("help")) {
-    std::cout << kUsage;
-    return 0;
-  }
+void run(const CommandLine& line) {
   const Runs runs = readRuns(line);
   const ObjectModel object = loadObject(line.text("object"));
   const Trajectory truth = readTruth(runs.truth, line);
@@ -184,28 +173,20 @@ int run(int argc, char** argv) {
     writeText(std::cout, contents.runs.back());
   }
   if (line.has("csv")) {
-    std::ofstream file = create(line.text("csv"));
+    std::ofstream file = createFile(line.text("csv"));
     writeSummaryCsv(file, contents.names, contents.runs);
   }
   if (line.has("frames")) {
-    std::ofstream file = create(line.text("frames"));
+    std::ofstream file = createFile(line.text("frames"));
     writeFrameCsv(file, contents.runs.front());
   }
   if (line.has("html")) writeHtml(line, std::move(contents), runs);
-  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  try {
-    return leap_object_tracker::run(argc, argv);
-  } catch (const leap_object_tracker::UsageError& error) {
-    std::cerr << "evaluate: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "evaluate: " << error.what() << "\n";
-    return 1;
-  }
+  using namespace leap_object_tracker;
+  return runProgram({"evaluate", kUsage, kOptions}, argc, argv, run);
 }

@@ -25,7 +25,7 @@ corners (mean of both eyes), good matches, and points in space, each as the mean
   --frames FILE.csv  the counts of every pair: stamp, and each count of FAST and of SURF
 )";
 
-const std::map<std::string, int> kOptions{{"object", 1}, {"csv", 1}, {"frames", 1}, {"help", 0}};
+const std::map<std::string, int> kOptions{{"object", 1}, {"csv", 1}, {"frames", 1}};
 
 constexpr int kMargin = 8;            // [px] around the object
 constexpr double kOnSurface = 0.002;  // [m] from the true surface
@@ -76,12 +76,6 @@ class DetectorCounter {
   FeatureExtractor extractor_;
 };
 
-std::ofstream create(const std::string& path) {
-  std::ofstream file(path);
-  if (!file) throw std::runtime_error("cannot write '" + path + "'");
-  return file;
-}
-
 double meanOf(const std::vector<Count>& counts, double Count::*member) {
   double sum = 0;
   for (const auto& count : counts) sum += count.*member;
@@ -97,12 +91,7 @@ void print(std::ostream& out, const std::string& bag, const char* detector,
   out << '\n';
 }
 
-int run(int argc, char** argv) {
-  const CommandLine line(argc, argv, kOptions);
-  if (line.has("help")) {
-    std::cout << kUsage;
-    return 0;
-  }
+void run(const CommandLine& line) {
   if (line.positional().size() != 1) throw UsageError("expected one BAG");
   if (!line.has("object")) throw UsageError("--object is missing");
   const ObjectModel object = loadObject(line.text("object"));
@@ -115,7 +104,7 @@ int run(int argc, char** argv) {
   std::vector<Count> of_fast, of_surf;
   std::ofstream frames;
   if (line.has("frames")) {
-    frames = create(line.text("frames"));
+    frames = createFile(line.text("frames"));
     frames << "stamp,fast_corners,fast_matches,fast_points,surf_corners,surf_matches,surf_points\n";
   }
   bag.forEachPair([&](const RawStereoFrame& raw) {
@@ -136,7 +125,7 @@ int run(int argc, char** argv) {
   if (of_fast.empty()) throw std::runtime_error("no pair of the bag has a true pose");
   const std::string name = std::filesystem::path(line.positional().front()).stem().string();
   std::ofstream csv;
-  if (line.has("csv")) csv = create(line.text("csv"));
+  if (line.has("csv")) csv = createFile(line.text("csv"));
   for (std::ostream* out :
        {static_cast<std::ostream*>(&std::cout), static_cast<std::ostream*>(&csv)}) {
     if (out == &csv && !csv.is_open()) continue;
@@ -144,20 +133,12 @@ int run(int argc, char** argv) {
     print(*out, name, "FAST", of_fast);
     print(*out, name, "SURF", of_surf);
   }
-  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  try {
-    return leap_object_tracker::run(argc, argv);
-  } catch (const leap_object_tracker::UsageError& error) {
-    std::cerr << "feature_table: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "feature_table: " << error.what() << "\n";
-    return 1;
-  }
+  using namespace leap_object_tracker;
+  return runProgram({"feature_table", kUsage, kOptions}, argc, argv, run);
 }

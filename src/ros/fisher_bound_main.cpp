@@ -34,9 +34,9 @@ of it over the frames. What other bodies hide counts as seen: a bound from below
   --csv FILE.csv      stamp, depth, visible shares and bounds of every frame
 )";
 
-const std::map<std::string, int> kOptions{{"object", 1},        {"sigma", 1}, {"correlation", 1},
-                                          {"eyes", 1},          {"csv", 1},   {"truth", 1},
-                                          {"least-visible", 1}, {"help", 0}};
+const std::map<std::string, int> kOptions{{"object", 1},       {"sigma", 1}, {"correlation", 1},
+                                          {"eyes", 1},         {"csv", 1},   {"truth", 1},
+                                          {"least-visible", 1}};
 
 /// A true pose, and the share of the object's side that each eye sees (1 if the bag does not tell).
 struct TrueFrame {
@@ -84,12 +84,7 @@ std::vector<LineElement> visibleLines(const ContourModel& model, const Eigen::Ve
   return lines;
 }
 
-int run(int argc, char** argv) {
-  const CommandLine line(argc, argv, kOptions);
-  if (line.has("help")) {
-    std::cout << kUsage;
-    return 0;
-  }
+void run(const CommandLine& line) {
   if (line.positional().size() != 1) throw UsageError("expected one BAG");
   if (!line.has("object")) throw UsageError("--object is missing");
   EdgeNoise noise;
@@ -109,8 +104,7 @@ int run(int argc, char** argv) {
 
   std::ofstream csv;
   if (line.has("csv")) {
-    csv.open(line.text("csv"));
-    if (!csv) throw std::runtime_error("cannot write '" + line.text("csv") + "'");
+    csv = createFile(line.text("csv"));
     csv << "stamp,depth_mm,left_visible,right_visible,position_bound_mm,orientation_bound_deg\n"
         << std::fixed;
   }
@@ -149,20 +143,12 @@ int run(int argc, char** argv) {
   std::printf("frames                      %d of %zu\n", frames, truth.size());
   std::printf("position bound RMS [mm]     %.3f\n", 1e3 * std::sqrt(position / frames));
   std::printf("orientation bound RMS [deg] %.3f\n", 180 / M_PI * std::sqrt(orientation / frames));
-  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  try {
-    return leap_object_tracker::run(argc, argv);
-  } catch (const leap_object_tracker::UsageError& error) {
-    std::cerr << "fisher_bound: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "fisher_bound: " << error.what() << "\n";
-    return 1;
-  }
+  using namespace leap_object_tracker;
+  return runProgram({"fisher_bound", kUsage, kOptions}, argc, argv, run);
 }

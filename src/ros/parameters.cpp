@@ -154,6 +154,8 @@ TrackerNodeParams readTrackerNodeParams(ParameterReader& reader) {
   reader.section("filter", [&](ParameterReader& r) {
     FilterParams& p = tracker.filter;
     r.read("particles", p.particles, {1, 10000000});
+    r.read("least_particles", p.least_particles, {0, 10000000});
+    r.read("budget_ms", p.budget_ms, {0, 1000});
     r.read("layers", p.layers, {1, 20});
     r.read("resample_below", p.resample_below, {0, 1});
     r.read("seed", p.seed);
@@ -214,6 +216,15 @@ RectifyNodeParams readRectifyNodeParams(ParameterReader& reader) {
   reader.ignore("image_transport");
   reader.finish();
   return params;
+}
+
+void readFilterOptions(const CommandLine& line, TrackerParams& params) {
+  if (line.has("particles"))
+    params.filter.particles = static_cast<int>(line.wholeNumber("particles", 1, 10000000));
+  if (line.has("threads")) params.threads = static_cast<int>(line.wholeNumber("threads", 1, 256));
+  if (line.has("seed"))
+    params.filter.seed = static_cast<std::uint64_t>(
+        line.wholeNumber("seed", 0, std::numeric_limits<long long>::max()));
 }
 
 YAML::Node loadYamlFile(const std::string& path) {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "command_line.hpp"
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
 #include "leap_object_tracker/tracking/tracker_params.hpp"
 
@@ -105,6 +106,10 @@ struct RectifyNodeParams {
 /// @throw std::invalid_argument naming key, value and what is allowed.
 TrackerNodeParams readTrackerNodeParams(ParameterReader& reader);
 RectifyNodeParams readRectifyNodeParams(ParameterReader& reader);
+
+/// Options --particles, --threads and --seed of a program, each if it is given and known there.
+/// @throw UsageError
+void readFilterOptions(const CommandLine& line, TrackerParams& params);
 
 /// @throw std::invalid_argument naming the file and what is wrong with it.
 YAML::Node loadYamlFile(const std::string& path);

@@ -11,6 +11,7 @@
 #include "leap_object_tracker/tracking/contour_measurement.hpp"
 #include "leap_object_tracker/tracking/tracker.hpp"
 #include "object_region.hpp"
+#include "parameters.hpp"
 #include "stereo_bag.hpp"
 
 namespace leap_object_tracker {
@@ -26,21 +27,15 @@ Tracks an object from its true start pose and writes what the particles do:
   cloud_first.csv, cloud_last.csv      places of some particles [mm]
 
   --particles N  (default: 100000)
-  --seed N
+  --threads N, --seed N
 )";
 
 const std::map<std::string, int> kOptions{
-    {"object", 1}, {"out", 1}, {"particles", 1}, {"seed", 1}, {"help", 0}};
+    {"object", 1}, {"out", 1}, {"particles", 1}, {"threads", 1}, {"seed", 1}};
 
 constexpr int kMargin = 40;  // [px] around the object, where edges are looked for
 constexpr int kBins = 50;
 constexpr int kShown = 2000;  // particles in a cloud
-
-std::ofstream create(const std::filesystem::path& path) {
-  std::ofstream file(path);
-  if (!file) throw std::runtime_error("cannot write '" + path.string() + "'");
-  return file;
-}
 
 /// Root mean square distance [m] and angle [rad] from the estimate.
 struct Spread {
@@ -73,7 +68,7 @@ class ParticleTable {
         measurement_(params_.contour, params_.eyes, rectifier_.camera()) {
     if (truth_.empty()) throw std::runtime_error("the bag has no true poses to start from");
     std::filesystem::create_directories(folder_);
-    particles_ = create(folder_ / "particles.csv");
+    particles_ = createFile(folder_ / "particles.csv");
     particles_ << "stamp,spread_mm,spread_deg,effective_share,support\n";
   }
 
@@ -98,10 +93,7 @@ class ParticleTable {
     TrackerParams params;
     params.measurement = Measurement::kContour;
     params.filter.particles = 100000;
-    if (line.has("particles"))
-      params.filter.particles = static_cast<int>(line.wholeNumber("particles", 1, 10000000));
-    if (line.has("seed"))
-      params.filter.seed = static_cast<std::uint64_t>(line.wholeNumber("seed", 0, 1 << 30));
+    readFilterOptions(line, params);
     return params;
   }
 
@@ -123,12 +115,12 @@ class ParticleTable {
   }
 
   void writeFrame(const Moment& moment, const std::string& name) {
-    std::ofstream weights = create(folder_ / ("weights_" + name + ".csv"));
+    std::ofstream weights = createFile(folder_ / ("weights_" + name + ".csv"));
     weights << "weight over the largest,particles\n";
     const std::vector<int> counts = histogramOfWeights(moment);
     for (int bin = 0; bin < kBins; ++bin)
       weights << (bin + 0.5) / kBins << ',' << counts[static_cast<std::size_t>(bin)] << '\n';
-    std::ofstream cloud = create(folder_ / ("cloud_" + name + ".csv"));
+    std::ofstream cloud = createFile(folder_ / ("cloud_" + name + ".csv"));
     cloud << "x_mm,y_mm,z_mm\n";
     const std::size_t step = std::max<std::size_t>(1, moment.particles.size() / kShown);
     for (std::size_t i = 0; i < moment.particles.size(); i += step) {
@@ -168,30 +160,17 @@ class ParticleTable {
   std::optional<Moment> last_;
 };
 
-int run(int argc, char** argv) {
-  const CommandLine line(argc, argv, kOptions);
-  if (line.has("help")) {
-    std::cout << kUsage;
-    return 0;
-  }
+void run(const CommandLine& line) {
   if (line.positional().size() != 1) throw UsageError("expected one BAG");
   for (const char* needed : {"object", "out"})
     if (!line.has(needed)) throw UsageError(std::string("--") + needed + " is missing");
   ParticleTable(line).run();
-  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  try {
-    return leap_object_tracker::run(argc, argv);
-  } catch (const leap_object_tracker::UsageError& error) {
-    std::cerr << "particle_table: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "particle_table: " << error.what() << "\n";
-    return 1;
-  }
+  using namespace leap_object_tracker;
+  return runProgram({"particle_table", kUsage, kOptions}, argc, argv, run);
 }

@@ -53,10 +53,9 @@ prints how often it is right in the third frame, by object, surroundings and dep
 )";
 
 const std::map<std::string, int> kOptions{
-    {"number", 1},      {"seed", 1},          {"scenes", 1},  {"depth", 2},
-    {"uniform", 0},     {"visible", 1},       {"widest", 1},  {"frames", 1},
-    {"calibration", 1}, {"config", 1},        {"threads", 1}, {"csv", 1},
-    {"only", 1},        {"list-failures", 0}, {"save", 1},    {"help", 0}};
+    {"number", 1},  {"seed", 1},   {"scenes", 1}, {"depth", 2},         {"uniform", 0},
+    {"visible", 1}, {"widest", 1}, {"frames", 1}, {"calibration", 1},   {"config", 1},
+    {"threads", 1}, {"csv", 1},    {"only", 1},   {"list-failures", 0}, {"save", 1}};
 
 constexpr std::size_t kDue = 3;  // the frame that is judged
 
@@ -64,7 +63,7 @@ TrackerParams readParams(const CommandLine& line) {
   ParameterReader reader(line.has("config") ? loadYamlFile(line.text("config")) : YAML::Node(),
                          "file '" + line.text("config") + "'");
   TrackerParams params = readTrackerNodeParams(reader).tracker;
-  if (line.has("threads")) params.threads = static_cast<int>(line.wholeNumber("threads", 1, 256));
+  readFilterOptions(line, params);
   // Each start has a tracker of its own; the views of a mesh are computed once.
   if (params.contour.cache_folder.empty())
     params.contour.cache_folder =
@@ -254,29 +253,16 @@ class RandomStarts {
   std::ofstream csv_;
 };
 
-int run(int argc, char** argv) {
-  const CommandLine line(argc, argv, kOptions);
-  if (line.has("help")) {
-    std::cout << kUsage;
-    return 0;
-  }
+void run(const CommandLine& line) {
   if (line.positional().empty()) throw UsageError("expected at least one OBJECT.yaml");
   if (!line.has("calibration")) throw UsageError("--calibration is missing");
   RandomStarts(line).run();
-  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  try {
-    return leap_object_tracker::run(argc, argv);
-  } catch (const leap_object_tracker::UsageError& error) {
-    std::cerr << "random_starts: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "random_starts: " << error.what() << "\n";
-    return 1;
-  }
+  using namespace leap_object_tracker;
+  return runProgram({"random_starts", kUsage, kOptions}, argc, argv, run);
 }

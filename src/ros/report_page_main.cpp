@@ -83,12 +83,7 @@ void addPart(HtmlPage& page, const YAML::Node& part, const fs::path& folder) {
     throw std::runtime_error("part '" + kind + "' is none of heading, text, table, plot, picture");
 }
 
-int run(int argc, char** argv) {
-  const CommandLine line(argc, argv, {{"help", 0}});
-  if (line.has("help")) {
-    std::cout << kUsage;
-    return 0;
-  }
+void run(const CommandLine& line) {
   if (line.positional().size() != 2) throw UsageError("expected PAGE.yaml and OUT.html");
   const std::string source = line.positional()[0];
   try {
@@ -99,20 +94,12 @@ int run(int argc, char** argv) {
   } catch (const YAML::Exception& error) {
     throw std::runtime_error("'" + source + "': " + error.what());
   }
-  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  try {
-    return leap_object_tracker::run(argc, argv);
-  } catch (const leap_object_tracker::UsageError& error) {
-    std::cerr << "report_page: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "report_page: " << error.what() << "\n";
-    return 1;
-  }
+  using namespace leap_object_tracker;
+  return runProgram({"report_page", kUsage, {}}, argc, argv, run);
 }

@@ -29,7 +29,7 @@ of the object's visible side that the eye sees), and /tf if the camera moves.
   --object FILE.yaml  instead of the scene's
 )";
 
-const std::map<std::string, int> kOptions{{"seed", 1}, {"frames", 1}, {"object", 1}, {"help", 0}};
+const std::map<std::string, int> kOptions{{"seed", 1}, {"frames", 1}, {"object", 1}};
 
 void writeFrame(rosbag::Bag& bag, const SimulatedFrame& frame, sensor_msgs::CameraInfo left_info,
                 sensor_msgs::CameraInfo right_info, bool camera_moves) {
@@ -71,12 +71,7 @@ int writeBag(const Scene& scene, const FittedCalibration& fitted, const std::str
   return frames;
 }
 
-int run(int argc, char** argv) {
-  const CommandLine line(argc, argv, kOptions);
-  if (line.has("help")) {
-    std::cout << kUsage;
-    return 0;
-  }
+void run(const CommandLine& line) {
   if (line.positional().size() != 2) throw UsageError("expected a scene and a bag");
   const std::string& bag = line.positional()[1];
   SceneOverrides overrides;
@@ -101,20 +96,12 @@ int run(int argc, char** argv) {
   std::printf("%s: %d frames of %s, seed %llu, %.1f MB, %.1f s\n", bag.c_str(), frames,
               scene.name.c_str(), static_cast<unsigned long long>(scene.seed),
               static_cast<double>(std::filesystem::file_size(bag)) / 1e6, elapsed.count());
-  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  try {
-    return leap_object_tracker::run(argc, argv);
-  } catch (const leap_object_tracker::UsageError& error) {
-    std::cerr << "simulate_bag: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "simulate_bag: " << error.what() << "\n";
-    return 1;
-  }
+  using namespace leap_object_tracker;
+  return runProgram({"simulate_bag", kUsage, kOptions}, argc, argv, run);
 }

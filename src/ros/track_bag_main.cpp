@@ -14,7 +14,7 @@
 
 #include "command_line.hpp"
 #include "conversions.hpp"
-#include "leap_object_tracker/evaluation/trajectory_error.hpp"
+#include "leap_object_tracker/evaluation/report_text.hpp"
 #include "leap_object_tracker/tracking/tracker.hpp"
 #include "overlay.hpp"
 #include "parameters.hpp"
@@ -55,18 +55,12 @@ const std::map<std::string, int> kOptions{
     {"fixed-frame", 1}, {"timing", 1},        {"errors", 1},      {"covariances", 1},
     {"overlay", 1},     {"overlay-every", 1}, {"left-image", 1},  {"right-image", 1},
     {"left-info", 1},   {"right-info", 1},    {"calibration", 1}, {"truth", 1},
-    {"map", 1},         {"save-map", 1},      {"help", 0}};
+    {"map", 1},         {"save-map", 1}};
 
 using Clock = std::chrono::steady_clock;
 
 double millisecondsSince(Clock::time_point begin) {
   return 1e3 * std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-std::ofstream openForWriting(const std::string& path) {
-  std::ofstream file(path);
-  if (!file) throw std::runtime_error("cannot write '" + path + "'");
-  return file;
 }
 
 TrackerParams readParams(const CommandLine& line) {
@@ -76,12 +70,7 @@ TrackerParams readParams(const CommandLine& line) {
   if (line.has("method")) params.measurement = measurementFromWord(line.text("method"));
   if (line.has("map")) params.feature.map_file = line.text("map");
   if (line.has("eyes")) params.eyes = eyesFromWord(line.text("eyes"));
-  if (line.has("particles"))
-    params.filter.particles = static_cast<int>(line.wholeNumber("particles", 1, 10000000));
-  if (line.has("threads")) params.threads = static_cast<int>(line.wholeNumber("threads", 1, 256));
-  if (line.has("seed"))
-    params.filter.seed = static_cast<std::uint64_t>(
-        line.wholeNumber("seed", 0, std::numeric_limits<long long>::max()));
+  readFilterOptions(line, params);
   return params;
 }
 
@@ -152,14 +141,14 @@ class BagTracking {
     if (line.has("fixed-frame")) transforms_ = bag_.transforms();
     if (!start_) tracker_.search();
     if (line.has("timing")) {
-      timing_ = openForWriting(line.text("timing"));
+      timing_ = createFile(line.text("timing"));
       timing_ << "stamp,state,rectification_ms,edges_ms,filter_ms,total_ms\n" << std::fixed;
     }
     if (line.has("overlay")) std::filesystem::create_directories(line.text("overlay"));
     if (line.has("every")) every_ = static_cast<std::size_t>(line.wholeNumber("every", 1, 1000000));
     if (line.has("overlay-every"))
       overlay_every_ = static_cast<std::size_t>(line.wholeNumber("overlay-every", 1, 1000000));
-    openForWriting(line.text("out"));  // fails now, not after the work
+    createFile(line.text("out"));  // fails now, not after the work
   }
 
   void run() {
@@ -280,20 +269,9 @@ class BagTracking {
     if (report.nees)
       std::printf("NEES              mean %.2f, 95 %% band %.2f to %.2f\n", report.nees->mean,
                   report.nees->band_low, report.nees->band_high);
-    if (line_.has("errors")) writeErrors(report);
-  }
-
-  void writeErrors(const TrajectoryReport& report) const {
-    std::ofstream file = openForWriting(line_.text("errors"));
-    file << "stamp,depth_mm,tracked,x_mm,y_mm,z_mm,position_mm,orientation_deg,add_s_mm,nees\n"
-         << std::fixed;
-    for (const FrameError& frame : report.frames) {
-      const Eigen::Vector3d offset = 1e3 * frame.offset;
-      file << std::setprecision(9) << seconds(frame.stamp) << ',' << std::setprecision(4)
-           << 1e3 * frame.distance << ',' << (frame.estimate ? 1 : 0) << ',' << offset.x() << ','
-           << offset.y() << ',' << offset.z() << ',' << 1e3 * frame.position << ','
-           << 180 / M_PI * frame.orientation << ',' << 1e3 * frame.add_s << ','
-           << frame.nees.value_or(0) << '\n';
+    if (line_.has("errors")) {
+      std::ofstream file = createFile(line_.text("errors"));
+      writeFrameCsv(file, report);
     }
   }
 
@@ -317,30 +295,17 @@ class BagTracking {
   std::size_t no_transform_ = 0;
 };
 
-int run(int argc, char** argv) {
-  const CommandLine line(argc, argv, kOptions);
-  if (line.has("help")) {
-    std::cout << kUsage;
-    return 0;
-  }
+void run(const CommandLine& line) {
   if (line.positional().size() != 1) throw UsageError("expected one BAG");
   for (const char* needed : {"object", "out"})
     if (!line.has(needed)) throw UsageError(std::string("--") + needed + " is missing");
   BagTracking(line).run();
-  return 0;
 }
 
 }  // namespace
 }  // namespace leap_object_tracker
 
 int main(int argc, char** argv) {
-  try {
-    return leap_object_tracker::run(argc, argv);
-  } catch (const leap_object_tracker::UsageError& error) {
-    std::cerr << "track_bag: " << error.what() << "\n\n" << leap_object_tracker::kUsage;
-    return 2;
-  } catch (const std::exception& error) {
-    std::cerr << "track_bag: " << error.what() << "\n";
-    return 1;
-  }
+  using namespace leap_object_tracker;
+  return runProgram({"track_bag", kUsage, kOptions}, argc, argv, run);
 }
