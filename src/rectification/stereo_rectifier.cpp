@@ -1,5 +1,7 @@
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -98,16 +100,14 @@ void StereoRectifier::rectify(const RawStereoFrame& frame, RectifiedStereoFrame&
       eye.second->release();
     else
       eye.second->create(target_.size, CV_8UC1);
-  cv::parallel_for_(cv::Range(0, 2 * kStripes), [&](const cv::Range& stripes) {
-    for (int stripe = stripes.start; stripe < stripes.end; ++stripe) {
-      const bool is_left = stripe < kStripes;
-      const cv::Mat& raw = is_left ? left : right;
-      if (raw.empty()) continue;
-      const int part = stripe % kStripes, rows = target_.size.height;
-      (is_left ? left_ : right_)
-          .fillRows(raw, is_left ? rectified.left : rectified.right, rows * part / kStripes,
-                    rows * (part + 1) / kStripes);
-    }
+  tbb::parallel_for(0, 2 * kStripes, [&](int stripe) {
+    const bool is_left = stripe < kStripes;
+    const cv::Mat& raw = is_left ? left : right;
+    if (raw.empty()) return;
+    const int part = stripe % kStripes, rows = target_.size.height;
+    (is_left ? left_ : right_)
+        .fillRows(raw, is_left ? rectified.left : rectified.right, rows * part / kStripes,
+                  rows * (part + 1) / kStripes);
   });
 }
 

@@ -3,8 +3,6 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include <opencv2/core.hpp>
-
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
@@ -24,10 +22,11 @@ void rectification(benchmark::State& state, const std::string& mode) {
   const Recording& frames = recording("x10_cube_textured", mode, kFrames);
   const StereoRectifier rectifier(frames.calibration, frames.camera);
   RectifiedStereoFrame rectified;
-  cv::setNumThreads(static_cast<int>(state.range(0)));
+  tbb::task_arena arena(static_cast<int>(state.range(0)));
   std::size_t i = 0;
-  timeEach(state, [&] { rectifier.rectify(frames.raw[i++ % frames.raw.size()], rectified); });
-  cv::setNumThreads(-1);
+  timeEach(state, [&] {
+    arena.execute([&] { rectifier.rectify(frames.raw[i++ % frames.raw.size()], rectified); });
+  });
 }
 BENCHMARK_CAPTURE(rectification, 640x240, "640x240")
     ->ArgName("threads")
@@ -139,7 +138,7 @@ void annealing(benchmark::State& state) {
             scores[i] = -off * off;
           }
         },
-        0.2, 0.4, 0);
+        0.2, 0.4);
   });
 }
 
@@ -179,7 +178,8 @@ void refinement(benchmark::State& state, const Recording& (*frames)()) {
   off << 0.001, -0.001, 0.001, 0.02, -0.02, 0.02;
   const Pose start = movedInCamera(recording.camera_from_object.front(), off);
   timeEach(state, [&] {
-    benchmark::DoNotOptimize(refiner.refine(model, seen.fields(), start, {}, 0.7, {6, 4, 2.5}));
+    benchmark::DoNotOptimize(
+        refiner.refine(model, seen.fields(), start, {}, Appearance(), {6, 4, 2.5}));
   });
 }
 BENCHMARK_CAPTURE(refinement, cube, &cube)->UseManualTime();

@@ -1,5 +1,5 @@
 // Whole frames, from the raw pair to the pose, and how long it takes until the first one.
-#include <opencv2/core.hpp>
+#include <tbb/task_arena.h>
 
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
 #include "leap_object_tracker/tracking/tracker.hpp"
@@ -30,12 +30,14 @@ class Sequence {
   std::size_t count_ = 0;
 };
 
-void wholeFrame(benchmark::State& state, const std::string& scene, const std::string& mode) {
+void wholeFrame(benchmark::State& state, const std::string& scene, const std::string& mode,
+                Measurement measurement) {
   const Recording& frames = recording(scene, mode, kFrames);
   TrackerParams params;
   params.filter.particles = static_cast<int>(state.range(0));
   params.threads = static_cast<int>(state.range(1));
-  cv::setNumThreads(params.threads);
+  params.measurement = measurement;
+  tbb::task_arena arena(params.threads);
   const StereoRectifier rectifier(frames.calibration, frames.camera);
   Tracker tracker(params, frames.object, frames.camera);
   tracker.start(frames.camera_from_object.front());
@@ -43,30 +45,41 @@ void wholeFrame(benchmark::State& state, const std::string& scene, const std::st
   RectifiedStereoFrame rectified;
   int tracked = 0, all = 0;
   const auto track = [&] {
-    rectifier.rectify(sequence.next(), rectified);
+    arena.execute([&] { rectifier.rectify(sequence.next(), rectified); });
     tracked += tracker.track(rectified).has_value();
     ++all;
   };
   for (int i = 0; i < 20; ++i) track();
   timeEach(state, track);
-  cv::setNumThreads(-1);
   state.counters["tracked"] = static_cast<double>(tracked) / all;
 }
-BENCHMARK_CAPTURE(wholeFrame, cube_640x240, "x10_cube_textured", "640x240")
-    ->ArgNames({"particles", "threads"})
-    ->ArgsProduct({{1000, 10000, 100000}, {1, 2}})
-    ->MinTime(1.5)
-    ->UseManualTime();
-BENCHMARK_CAPTURE(wholeFrame, cube_640x480, "x10_cube_textured", "640x480")
-    ->ArgNames({"particles", "threads"})
-    ->ArgsProduct({{1000}, {1, 2}})
-    ->MinTime(1.5)
-    ->UseManualTime();
-BENCHMARK_CAPTURE(wholeFrame, mug_640x240, "wobble_mug", "640x240")
-    ->ArgNames({"particles", "threads"})
-    ->ArgsProduct({{1000}, {1, 2}})
-    ->MinTime(1.5)
-    ->UseManualTime();
+/// As it comes: contour, and features where there are any.
+const bool registered = [] {
+  struct Case {
+    const char *name, *scene, *mode;
+    Measurement measurement;
+    std::vector<std::int64_t> particles;
+  };
+  for (const Case& one :
+       {Case{"wholeFrame/cube_640x240",
+             "x10_cube_textured",
+             "640x240",
+             Measurement::kAuto,
+             {1000, 10000, 100000}},
+        Case{"wholeFrame/cube_contour",
+             "x10_cube_textured",
+             "640x240",
+             Measurement::kContour,
+             {1000, 10000, 100000}},
+        Case{"wholeFrame/cube_640x480", "x10_cube_textured", "640x480", Measurement::kAuto, {1000}},
+        Case{"wholeFrame/mug_640x240", "wobble_mug", "640x240", Measurement::kAuto, {1000}}})
+    benchmark::RegisterBenchmark(one.name, wholeFrame, one.scene, one.mode, one.measurement)
+        ->ArgNames({"particles", "threads"})
+        ->ArgsProduct({one.particles, {1, 2}})
+        ->MinTime(1.5)
+        ->UseManualTime();
+  return true;
+}();
 
 /// A finely tessellated torus: a mesh of 2 * rings * rings triangles.
 ObjectModel torus(std::uint32_t rings) {

@@ -4,8 +4,6 @@
 #include <tbb/task_arena.h>
 #include <valgrind/callgrind.h>
 
-#include <opencv2/core.hpp>
-
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
@@ -60,14 +58,16 @@ void countAll() {
           for (std::size_t i = 0; i < many; ++i)
             likelihoods[i] = -1e3F * std::abs(particles[i].translation[0]);
         },
-        0.2, 0.4, 0);
+        0.2, 0.4);
   });
 
   const PoseRefiner refiner(contour, frames.camera);
   Twist off;
   off << 0.001, -0.001, 0.001, 0.02, -0.02, 0.02;
   const Pose start = movedInCamera(frames.camera_from_object[0], off);
-  count("refinement", [&] { refiner.refine(model, seen.fields(), start, {}, 0.7, {6, 4, 2.5}); });
+  count("refinement", [&] {
+    refiner.refine(model, seen.fields(), start, {}, Appearance(), {6, 4, 2.5});
+  });
   PoseSearch search(TrackerParams(), frames.object, model, frames.camera);
   count("search", [&] { search.find(frames.rectified[0], std::nullopt); });
 
@@ -87,7 +87,6 @@ void countAll() {
 }  // namespace leap_object_tracker
 
 int main() {
-  cv::setNumThreads(1);
   tbb::task_arena arena(1);
   arena.execute([] { leap_object_tracker::countAll(); });
 }

@@ -23,7 +23,8 @@ struct RectificationParams {
 RectifiedStereoCamera rectifiedCamera(const StereoCalibration& calibration,
                                       const RectificationParams& params);
 
-/// Turns raw pairs into rectified ones; the tables are built once.
+/// Turns raw pairs into rectified ones; the tables are built once. On the threads of the TBB arena
+/// that calls it.
 class StereoRectifier {
  public:
   StereoRectifier(const StereoCalibration& calibration, const RectifiedStereoCamera& target);
