@@ -79,8 +79,13 @@ TEST(Allocations, areCounted) {
 
 TEST(Allocations, doNotHappenInRectification) {
   const StereoRectifier rectifier(frames().calibration, frames().camera);
+  // Each eye in an image of its own, as messages bring them.
+  const RawStereoFrame raw{frames().raw[0].stamp, frames().raw[0].left.clone(),
+                           frames().raw[0].right.clone()};
   RectifiedStereoFrame rectified;
-  EXPECT_EQ(allocationsOf([&](int) { rectifier.rectify(frames().raw[0], rectified); }), 0);
+  tbb::task_arena arena(1);
+  arena.execute(
+      [&] { EXPECT_EQ(allocationsOf([&](int) { rectifier.rectify(raw, rectified); }), 0); });
 }
 
 TEST(Allocations, doNotHappenInTheParticleFilter) {
