@@ -116,10 +116,10 @@ class ParticleTable {
 
   void writeFrame(const Moment& moment, const std::string& name) {
     std::ofstream weights = createFile(folder_ / ("weights_" + name + ".csv"));
-    weights << "weight over the largest,particles\n";
+    weights << "log weight below the largest [nats],particles\n";
     const std::vector<int> counts = histogramOfWeights(moment);
     for (int bin = 0; bin < kBins; ++bin)
-      weights << (bin + 0.5) / kBins << ',' << counts[static_cast<std::size_t>(bin)] << '\n';
+      weights << bin + 0.5 - kBins << ',' << counts[static_cast<std::size_t>(bin)] << '\n';
     std::ofstream cloud = createFile(folder_ / ("cloud_" + name + ".csv"));
     cloud << "x_mm,y_mm,z_mm\n";
     const std::size_t step = std::max<std::size_t>(1, moment.particles.size() / kShown);
@@ -129,7 +129,8 @@ class ParticleTable {
     }
   }
 
-  /// Weights by the sharp contour likelihood of both eyes.
+  /// Log weights by the sharp contour likelihood of both eyes, below the largest in bins of one
+  /// nat; the first bin holds all that is smaller.
   std::vector<int> histogramOfWeights(const Moment& moment) {
     measurement_.observe(
         moment.frame, objectRegions(object_.mesh, moment.estimate, rectifier_.camera(), kMargin));
@@ -142,7 +143,7 @@ class ParticleTable {
     std::vector<int> counts(kBins, 0);
     for (const float score : scores)
       ++counts[static_cast<std::size_t>(
-          std::min(kBins - 1, static_cast<int>(kBins * std::exp(score - best))))];
+          std::clamp(kBins - 1 + static_cast<int>(score - best), 0, kBins - 1))];
     return counts;
   }
 
