@@ -427,6 +427,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     result.log_likelihood += m.samples * (m.found ? std::max(gain, -m.expected) : -m.expected) +
                              kRegionWeight * m.expected * m.samples * static_cast<double>(m.region);
   }
+  result.evidence = result.log_likelihood;
   // Lines that the model lacks or has too many spoil the fits; points without a fit do not count.
   double misfit = 0, fitted = 0, all = 0;
   for (const Match& m : matches) {

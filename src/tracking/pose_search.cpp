@@ -14,6 +14,9 @@ namespace {
 
 constexpr int kOrientations = 4400;  // about 15 deg apart over all of SO(3)
 constexpr int kMostPlaces = 14;
+constexpr std::size_t kTurned = 12;        // of the turned poses that are refined
+constexpr int kBoxPoints = 64;             // of the contour, for the box around it
+constexpr double kOtherShape = 0.5;        // log of the ratio of elongations
 constexpr int kCoarsePoints = 32;          // of the contour, for the first look
 constexpr std::size_t kLikelyPlaces = 3;   // first by how well their blob fits
 constexpr std::size_t kKeptAtLikely = 40;  // hypotheses of such a place that move on
@@ -22,6 +25,10 @@ constexpr int kChildren = 20;  // random steps of each, a round
 constexpr int kRounds = 4;
 constexpr std::size_t kRefinedAtLikely = 8;
 constexpr std::size_t kRefinedElsewhere = 2;
+constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
+// Of the best score that so much contour could have: less speaks against a pose. Without it, views
+// that show more contour would win.
+constexpr float kToBeExpected = 0.65F;
 constexpr EdgeKernel kBlunt{3.0F, 3.0F};
 
 /// Even set over SO(3) (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1).
@@ -64,6 +71,42 @@ std::vector<Eigen::Matrix3d> distinctRotations(const Symmetry& symmetry, int cou
   return kept;
 }
 
+/// Turns after which a body may look nearly the same: upside down, and round its axes.
+std::vector<Eigen::Matrix3d> turnsToTry(const Symmetry& symmetry) {
+  std::vector<Eigen::Matrix3d> turns;
+  const auto add = [&](const Eigen::Matrix3d& turn) {
+    if (angleBetween(turn, Eigen::Matrix3d::Identity(), symmetry) > 0.1) turns.push_back(turn);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    const int steps = symmetry.rotations.size() > 1 || symmetry.hasFreeAxis() ? 4 : 24;
+    for (int step = 1; step < steps; ++step) {
+      const Eigen::Vector3d spin = Eigen::Vector3d::Unit(axis) * (2 * M_PI * step / steps);
+      for (int flip = 0; flip < 2; ++flip)
+        add(rotationFromVector(spin) *
+            rotationFromVector(flip * M_PI * Eigen::Vector3d::Unit((axis + 1) % 3)));
+    }
+  }
+  return turns;
+}
+
+/// Turns the object about a point of its own.
+Pose turnedAbout(const Pose& pose, const Eigen::Vector3d& point, const Eigen::Matrix3d& turn) {
+  Pose result = pose;
+  result.linear() = pose.linear() * turn;
+  result.translation() = pose * point - result.linear() * point;
+  return result;
+}
+
+Eigen::Vector3d middleOf(const Mesh& mesh) {
+  if (mesh.vertices.empty()) return Eigen::Vector3d::Zero();
+  Eigen::Vector3d low = mesh.vertices.front(), high = low;
+  for (const auto& vertex : mesh.vertices) {
+    low = low.cwiseMin(vertex);
+    high = high.cwiseMax(vertex);
+  }
+  return (low + high) / 2;
+}
+
 double surfaceOf(const Mesh& mesh) {
   double doubled = 0;
   for (const auto& t : mesh.triangles)
@@ -82,7 +125,9 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       model_(&model),
       refiner_(params.contour, camera),
       surface_(surfaceOf(object.mesh)),
+      middle_(middleOf(object.mesh)),
       symmetry_(object.symmetry),
+      turns_(turnsToTry(object.symmetry)),
       orientations_(distinctRotations(object.symmetry, kOrientations)) {}
 
 std::vector<PoseSearch::Blob> PoseSearch::findBlobs(const cv::Mat& image) const {
@@ -97,6 +142,8 @@ std::vector<PoseSearch::Blob> PoseSearch::findBlobs(const cv::Mat& image) const 
       Blob blob;
       blob.area = 4.0 * statistics.at<int>(i, cv::CC_STAT_AREA);
       if (blob.area < 40) continue;
+      blob.left = 2.0 * statistics.at<int>(i, cv::CC_STAT_LEFT);
+      blob.top = 2.0 * statistics.at<int>(i, cv::CC_STAT_TOP);
       blob.width = 2.0 * statistics.at<int>(i, cv::CC_STAT_WIDTH);
       blob.height = 2.0 * statistics.at<int>(i, cv::CC_STAT_HEIGHT);
       blob.u = 2 * centroids.at<double>(i, 0) + 0.5;
@@ -108,11 +155,7 @@ std::vector<PoseSearch::Blob> PoseSearch::findBlobs(const cv::Mat& image) const 
   return blobs;
 }
 
-std::vector<Eigen::Vector3d> PoseSearch::findPlaces(const RectifiedStereoFrame& frame) const {
-  struct Place {
-    Eigen::Vector3d point;
-    double doubt;
-  };
+std::vector<PoseSearch::Place> PoseSearch::findPlaces(const RectifiedStereoFrame& frame) const {
   std::vector<Place> places;
   const double focal = camera_.focal_length;
   const bool left_used = params_.eyes != Eyes::kRight && !frame.left.empty();
@@ -126,7 +169,9 @@ std::vector<Eigen::Vector3d> PoseSearch::findPlaces(const RectifiedStereoFrame& 
     if (misfit > std::log(4.0)) return;
     places.push_back({{eye_x + (blob.u - camera_.center_u) * depth / focal,
                        (blob.v - camera_.center_v) * depth / focal, depth},
-                      misfit + doubt});
+                      misfit + doubt,
+                      blob,
+                      eye_x});
   };
   const double half_radius = 0.35 * model_->radius();
   for (const Blob& blob : left) {
@@ -148,16 +193,77 @@ std::vector<Eigen::Vector3d> PoseSearch::findPlaces(const RectifiedStereoFrame& 
 
   std::sort(places.begin(), places.end(),
             [](const Place& a, const Place& b) { return a.doubt < b.doubt; });
-  std::vector<Eigen::Vector3d> chosen;
+  std::vector<Place> chosen;
   for (const Place& place : places) {
-    const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Eigen::Vector3d& other) {
-      return (other - place.point).norm() < 0.35 * model_->radius() &&
-             std::abs(std::log(other.z() / place.point.z())) < 0.1;
+    const bool known = std::any_of(chosen.begin(), chosen.end(), [&](const Place& other) {
+      return (other.point - place.point).norm() < 0.35 * model_->radius() &&
+             std::abs(std::log(other.point.z() / place.point.z())) < 0.1;
     });
-    if (!known) chosen.push_back(place.point);
+    if (!known) chosen.push_back(place);
     if (chosen.size() >= kMostPlaces) break;
   }
   return chosen;
+}
+
+/// What one eye sees of the first `points` of the contour at a pose.
+std::optional<PoseSearch::Glance> PoseSearch::glance(const ParticlePose& pose, double eye_x,
+                                                     int points) const {
+  using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
+  const Eigen::Map<const RowMajor> object_rotation(pose.rotation.data());
+  const Eigen::Vector3f origin(pose.translation[0] - static_cast<float>(eye_x), pose.translation[1],
+                               pose.translation[2]);
+  const ViewChoice choice = model_->choose(-(object_rotation.transpose() * origin));
+  if (choice.view == nullptr || choice.view->arrays.empty()) return std::nullopt;
+  Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();
+  turn(0, 0) = turn(1, 1) = choice.cosine;
+  turn(0, 1) = -choice.sine;
+  turn(1, 0) = choice.sine;
+  const Eigen::Matrix3f rotation = object_rotation * turn;
+  const auto count = static_cast<std::size_t>(model_->points());
+  const float* values = choice.view->arrays.data();
+  const auto column = [&](std::size_t first, std::size_t i) {
+    return Eigen::Vector3f(values[first * count + i], values[(first + 1) * count + i],
+                           values[(first + 2) * count + i]);
+  };
+  Glance seen;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(points); ++i) {
+    const Eigen::Vector3f at = origin + rotation * column(0, i);
+    if (at.z() < 0.02F) return std::nullopt;
+    const Eigen::Array2f slope = at.head<2>().array() / at.z();
+    seen.low = seen.low.min(slope);
+    seen.high = seen.high.max(slope);
+    const Eigen::Vector3f along = rotation * column(3, i);
+    seen.length += (along.head<2>().array() - slope * along.z()).matrix().norm() / at.z();
+  }
+  seen.length *= static_cast<float>(camera_.focal_length);
+  return seen;
+}
+
+/// Moves a pose until the box around its contour has the centre and the area of the blob's; nothing
+/// if it is of another shape altogether.
+std::optional<Pose> PoseSearch::fitToBox(const Pose& pose, const Place& place) const {
+  const std::optional<Glance> seen =
+      glance(toParticlePose(pose), place.eye_x, std::min(kBoxPoints, model_->points()));
+  if (!seen) return std::nullopt;
+  const Eigen::Array2f low = seen->low, high = seen->high;
+  const Eigen::Vector3d origin = pose.translation() - Eigen::Vector3d(place.eye_x, 0, 0);
+  const double focal = camera_.focal_length;
+  const Eigen::Array2d size = (high - low).cast<double>() * focal;
+  const Eigen::Array2d middle = 0.5 * (high + low).cast<double>();
+  const double elongation =
+      std::log(size.x() / size.y()) - std::log(place.blob.width / place.blob.height);
+  if (!(std::abs(elongation) < kOtherShape)) return std::nullopt;
+  const double grown =
+      std::clamp(std::sqrt(size.x() * size.y() / (place.blob.width * place.blob.height)), 0.7, 1.4);
+  const Eigen::Array2d wanted(
+      (place.blob.left + 0.5 * (place.blob.width - 1) - camera_.center_u) / focal,
+      (place.blob.top + 0.5 * (place.blob.height - 1) - camera_.center_v) / focal);
+  const Eigen::Array2d own = origin.head<2>().array() / origin.z();
+  Pose fitted = pose;
+  const double depth = pose.translation().z() * grown;
+  const Eigen::Array2d moved = (wanted + (own - middle) / grown) * depth;
+  fitted.translation() << moved.x() + place.eye_x, moved.y(), depth;
+  return fitted;
 }
 
 const std::array<GainMap, 2>& PoseSearch::mapsFor(double depth, int sharpening) const {
@@ -176,11 +282,19 @@ void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses, int points,
     eyes[eye].center_v = static_cast<float>(camera_.center_v);
     eyes[eye].eye_x = eye == 0 ? 0 : static_cast<float>(camera_.baseline);
   }
+  const auto eye_count = std::count_if(eyes.begin(), eyes.end(),
+                                       [](const EyeView& eye) { return eye.map != nullptr; });
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hypotheses.size(), 256),
                     [&](const tbb::blocked_range<std::size_t>& range) {
-                      for (std::size_t i = range.begin(); i != range.end(); ++i)
-                        scoreContours(*model_, points, eyes.data(), eyes.size(), 1 / 3.0F,
-                                      &hypotheses[i].pose, 1, &hypotheses[i].score);
+                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                        Hypothesis& hypothesis = hypotheses[i];
+                        scoreContours(*model_, points, eyes.data(), eyes.size(), kIndependentShare,
+                                      &hypothesis.pose, 1, &hypothesis.score);
+                        const auto seen = glance(hypothesis.pose, 0, points);
+                        if (seen)
+                          hypothesis.score -= kToBeExpected * kBlunt.log_ratio * kIndependentShare *
+                                              seen->length * static_cast<float>(eye_count);
+                      }
                     });
 }
 
@@ -197,7 +311,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       fields_[eye].transform(kBlunt, 1 << level, maps_[level][eye]);
   });
 
-  std::vector<Eigen::Vector3d> places = findPlaces(frame);
+  const std::vector<Place> places = findPlaces(frame);
   std::vector<Hypothesis> kept;
   // Best first, none of them within `apart` [rad] of a better one.
   const auto keepDistinct = [&](std::vector<Hypothesis>& all, std::size_t count, double apart) {
@@ -220,20 +334,20 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   };
   std::vector<Hypothesis> hypotheses;
   for (std::size_t index = 0; index < places.size(); ++index) {
-    const Eigen::Vector3d& place = places[index];
+    const Eigen::Vector3d& place = places[index].point;
     hypotheses.clear();
-    for (const double stretch : {0.93, 1.0, 1.07}) {
-      // Orientations are laid out as seen along the ray to the place.
-      const Eigen::Matrix3d facing =
-          Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), place).toRotationMatrix();
-      for (const auto& orientation : orientations_) {
-        Pose pose = Pose::Identity();
-        pose.translation() = place * stretch;
-        pose.linear() = facing * orientation;
-        hypotheses.push_back({toParticlePose(pose), 0, index});
-      }
+    // Orientations are laid out as seen along the ray to the place.
+    const Eigen::Matrix3d facing =
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), place).toRotationMatrix();
+    for (const auto& orientation : orientations_) {
+      Pose pose = Pose::Identity();
+      pose.translation() = place;
+      pose.linear() = facing * orientation;
+      hypotheses.push_back({toParticlePose(pose), 0, index});
+      if (const auto fitted = fitToBox(pose, places[index]))
+        hypotheses.push_back({toParticlePose(*fitted), 0, index});
     }
-    scoreAll(hypotheses, kCoarsePoints, mapsFor(place.z()));
+    scoreAll(hypotheses, kCoarsePoints, mapsFor(place.z(), 1));
     keepDistinct(hypotheses, index < kLikelyPlaces ? kKeptAtLikely : kKeptElsewhere, 0.2);
     kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
   }
@@ -297,10 +411,27 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
     refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 8, 6, 4, 3, 2.5});
   });
-  const auto best = std::max_element(refined.begin(), refined.end(),
-                                     [](const RefinedPose& a, const RefinedPose& b) {
-                                       return a.log_likelihood < b.log_likelihood;
-                                     });
+  const auto less = [](const RefinedPose& a, const RefinedPose& b) {
+    return a.evidence < b.evidence;
+  };
+  auto best = std::max_element(refined.begin(), refined.end(), less);
+  // A body that looks nearly the same turned over or round may have been taken for it.
+  const RefinedPose first = *best;
+  const double first_depth = std::max(0.03, first.camera_from_object.translation().z());
+  hypotheses.clear();
+  for (const Eigen::Matrix3d& turn : turns_)
+    hypotheses.push_back(
+        {toParticlePose(turnedAbout(first.camera_from_object, middle_, turn)), 0, 0});
+  scoreAll(hypotheses, model_->points(), mapsFor(first_depth, 1));
+  keepDistinct(hypotheses, kTurned, 0.15);
+  starts.clear();
+  for (const Hypothesis& hypothesis : hypotheses) starts.push_back(toPose(hypothesis.pose));
+  starts.push_back(first.camera_from_object);
+  refined.resize(starts.size());
+  tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
+    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 7, 4, 3, 2.5});
+  });
+  best = std::max_element(refined.begin(), refined.end(), less);
   const double depth = best->camera_from_object.translation().z();
   if (depth < params_.volume.nearest || depth > params_.volume.farthest) return std::nullopt;
   return *best;

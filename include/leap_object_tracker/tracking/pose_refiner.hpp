@@ -39,6 +39,10 @@ struct RefinedPose {
       0;  ///< share of supported outline on whose inner side the image is brighter
   double log_likelihood = 0;  ///< sum over independent samples of the gain against chance [nats]
 
+  /// The same without regard to what the image shows besides [nats]: compares poses of different
+  /// places.
+  double evidence = 0;
+
   double support() const {
     const double visible = eyes[0].visible + eyes[1].visible;
     return visible > 0 ? (eyes[0].supported + eyes[1].supported) / visible : 0;

@@ -42,12 +42,27 @@ class PoseSearch {
     std::size_t place = 0;
   };
   struct Blob {
-    double u = 0, v = 0, area = 0, width = 0, height = 0;
+    double u = 0, v = 0, area = 0;                    ///< centroid, area [px, px^2]
+    double left = 0, top = 0, width = 0, height = 0;  ///< box around it [px]
     int threshold = 0;
+  };
+  /// Where the object may be, and the box that it then fills in one eye.
+  struct Place {
+    Eigen::Vector3d point;  ///< [m]
+    double doubt = 0;
+    Blob blob;
+    double eye_x = 0;  ///< [m] of the eye that sees the blob
   };
 
   std::vector<Blob> findBlobs(const cv::Mat& image) const;
-  std::vector<Eigen::Vector3d> findPlaces(const RectifiedStereoFrame& frame) const;
+  std::vector<Place> findPlaces(const RectifiedStereoFrame& frame) const;
+  struct Glance {
+    Eigen::Array2f low = Eigen::Array2f::Constant(1e9F);    ///< least x / z, y / z
+    Eigen::Array2f high = Eigen::Array2f::Constant(-1e9F);  ///< largest ones
+    float length = 0;                                       ///< [px] of contour
+  };
+  std::optional<Glance> glance(const ParticlePose& pose, double eye_x, int points) const;
+  std::optional<Pose> fitToBox(const Pose& pose, const Place& place) const;
   void scoreAll(std::vector<Hypothesis>& hypotheses, int points,
                 const std::array<GainMap, 2>& maps) const;
   const std::array<GainMap, 2>& mapsFor(double depth, int sharpening = 0) const;
@@ -56,8 +71,10 @@ class PoseSearch {
   RectifiedStereoCamera camera_;
   const ContourModel* model_;
   PoseRefiner refiner_;
-  double surface_ = 0;  ///< [m^2]
+  double surface_ = 0;      ///< [m^2]
+  Eigen::Vector3d middle_;  ///< [m] of the box around the object, in its frame
   Symmetry symmetry_;
+  std::vector<Eigen::Matrix3d> turns_;
   std::vector<Eigen::Matrix3d> orientations_;
   std::array<EdgeField, 2> fields_;
   std::array<std::array<GainMap, 2>, 4> maps_;  ///< by cell size 1, 2, 4, 8 px; by eye
