@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kOrientations = 4400;  // about 15 deg apart over all of SO(3)
 constexpr int kMostPlaces = 14;
-constexpr std::size_t kTurned = 12;        // of the turned poses that are refined
+constexpr std::size_t kTurned = 24;        // of the turned poses that are refined
 constexpr int kBoxPoints = 64;             // of the contour, for the box around it
 constexpr double kOtherShape = 0.5;        // log of the ratio of elongations
 constexpr int kCoarsePoints = 32;          // of the contour, for the first look
@@ -75,7 +75,15 @@ std::vector<Eigen::Matrix3d> distinctRotations(const Symmetry& symmetry, int cou
 std::vector<Eigen::Matrix3d> turnsToTry(const Symmetry& symmetry) {
   std::vector<Eigen::Matrix3d> turns;
   const auto add = [&](const Eigen::Matrix3d& turn) {
-    if (angleBetween(turn, Eigen::Matrix3d::Identity(), symmetry) > 0.1) turns.push_back(turn);
+    // The axes of all poses that look the same.
+    for (const Eigen::Matrix3d& same : symmetry.rotations) {
+      const Eigen::Matrix3d all = same * turn;
+      const auto alike = [&](const Eigen::Matrix3d& other) {
+        return angleBetween(all, other, symmetry) < 0.1;
+      };
+      if (!alike(Eigen::Matrix3d::Identity()) && std::none_of(turns.begin(), turns.end(), alike))
+        turns.push_back(all);
+    }
   };
   for (int axis = 0; axis < 3; ++axis) {
     const int steps = symmetry.rotations.size() > 1 || symmetry.hasFreeAxis() ? 4 : 24;
@@ -89,22 +97,40 @@ std::vector<Eigen::Matrix3d> turnsToTry(const Symmetry& symmetry) {
   return turns;
 }
 
-/// Turns the object about a point of its own.
-Pose turnedAbout(const Pose& pose, const Eigen::Vector3d& point, const Eigen::Matrix3d& turn) {
-  Pose result = pose;
-  result.linear() = pose.linear() * turn;
-  result.translation() = pose * point - result.linear() * point;
-  return result;
-}
-
-Eigen::Vector3d middleOf(const Mesh& mesh) {
-  if (mesh.vertices.empty()) return Eigen::Vector3d::Zero();
-  Eigen::Vector3d low = mesh.vertices.front(), high = low;
-  for (const auto& vertex : mesh.vertices) {
-    low = low.cwiseMin(vertex);
-    high = high.cwiseMax(vertex);
+/// About what a body may be turned and still look nearly the same: the middle of the box around it
+/// and, along each axis on which that is elsewhere, the median of its surface, which a handle
+/// hardly moves.
+std::vector<Eigen::Vector3d> pivotsOf(const Mesh& mesh) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), median = middle;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<std::pair<double, double>> places;  // [m, m^2]
+    double all = 0, low = 1e9, high = -1e9;
+    for (const auto& t : mesh.triangles) {
+      const auto &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+      places.emplace_back((a[axis] + b[axis] + c[axis]) / 3, (b - a).cross(c - a).norm());
+      all += places.back().second;
+      low = std::min({low, a[axis], b[axis], c[axis]});
+      high = std::max({high, a[axis], b[axis], c[axis]});
+    }
+    std::sort(places.begin(), places.end());
+    double passed = 0;
+    for (const auto& [place, area] : places)
+      if ((passed += area) >= all / 2) {
+        median[axis] = place;
+        break;
+      }
+    middle[axis] = (low + high) / 2;
   }
-  return (low + high) / 2;
+  std::vector<Eigen::Vector3d> pivots{middle};
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (std::abs(median[axis] - middle[axis]) < 0.002) continue;
+    const std::size_t count = pivots.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      pivots.push_back(pivots[i]);
+      pivots.back()[axis] = median[axis];
+    }
+  }
+  return pivots;
 }
 
 double surfaceOf(const Mesh& mesh) {
@@ -125,7 +151,7 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       model_(&model),
       refiner_(params.contour, camera),
       surface_(surfaceOf(object.mesh)),
-      middle_(middleOf(object.mesh)),
+      pivots_(pivotsOf(object.mesh)),
       symmetry_(object.symmetry),
       turns_(turnsToTry(object.symmetry)),
       orientations_(distinctRotations(object.symmetry, kOrientations)) {}
@@ -298,6 +324,18 @@ void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses, int points,
                     });
 }
 
+std::vector<Pose> PoseSearch::turned(const Pose& camera_from_object) const {
+  std::vector<Pose> poses;
+  for (const Eigen::Vector3d& pivot : pivots_)
+    for (const Eigen::Matrix3d& turn : turns_) {
+      Pose pose = camera_from_object;
+      pose.linear() = camera_from_object.linear() * turn;
+      pose.translation() = camera_from_object * pivot - pose.linear() * pivot;
+      poses.push_back(pose);
+    }
+  return poses;
+}
+
 std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
                                             const std::optional<Pose>& near) {
   ++calls_;
@@ -419,19 +457,24 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   const RefinedPose first = *best;
   const double first_depth = std::max(0.03, first.camera_from_object.translation().z());
   hypotheses.clear();
-  for (const Eigen::Matrix3d& turn : turns_)
-    hypotheses.push_back(
-        {toParticlePose(turnedAbout(first.camera_from_object, middle_, turn)), 0, 0});
-  scoreAll(hypotheses, model_->points(), mapsFor(first_depth, 1));
+  for (const Pose& pose : turned(first.camera_from_object))
+    hypotheses.push_back({toParticlePose(pose), 0, 0});
+  scoreAll(hypotheses, model_->points(), mapsFor(first_depth, 2));
   keepDistinct(hypotheses, kTurned, 0.15);
   starts.clear();
   for (const Hypothesis& hypothesis : hypotheses) starts.push_back(toPose(hypothesis.pose));
   starts.push_back(first.camera_from_object);
   refined.resize(starts.size());
+  // Most of the silhouette is right already: it tells what is object and what is not.
+  Appearance looks;
+  refiner_.learn(*model_, fields_, first.camera_from_object, looks);
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
-    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 7, 4, 3, 2.5});
+    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, looks, {10, 7, 4, 3, 2.5});
   });
-  best = std::max_element(refined.begin(), refined.end(), less);
+  best = std::max_element(refined.begin(), refined.end(),
+                          [](const RefinedPose& a, const RefinedPose& b) {
+                            return a.log_likelihood < b.log_likelihood;
+                          });
   const double depth = best->camera_from_object.translation().z();
   if (depth < params_.volume.nearest || depth > params_.volume.farthest) return std::nullopt;
   return *best;

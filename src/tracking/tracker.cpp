@@ -35,11 +35,19 @@ constexpr double kDoubtCost = 5;        // [nats] against a pose that says so
 constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
 constexpr double kLearningSupport = 0.7;     // of a pose at which the object's looks are learned
-constexpr double kExact = 0.5;               // [px]
-constexpr int kPatience = 3;                 // frames below it before the object counts as lost
-constexpr double kFoundSupport = 0.6;        // share of the contour that a found pose must have
-constexpr double kLandmarkSupport = 0.6;     // FeatureTracking::support to stand by a pose
-constexpr float kOutsideVolume = 1000;       // [nats] against a pose outside the working volume
+constexpr int kYoungFrames = 80;  // after a start, in which turned poses are looked at often
+constexpr int kYoungPeriod = 2, kOldPeriod = 12;  // [frames]
+constexpr std::size_t kTurnedRefined = 6;         // turned poses a look
+constexpr double kTurnedMargin = 15;              // [nats] by which a turned pose must be better
+constexpr double kTurnedShare = 0.15;             // and this share of what it has
+constexpr int kTurnedVotes = 3;                   // looks in a row
+constexpr double kApart = 0.25;                   // [rad]
+constexpr double kTrustedLandmarks = 0.5;  // share of landmarks that make turned poses needless
+constexpr double kExact = 0.5;             // [px]
+constexpr int kPatience = 3;               // frames below it before the object counts as lost
+constexpr double kFoundSupport = 0.6;      // share of the contour that a found pose must have
+constexpr double kLandmarkSupport = 0.6;   // FeatureTracking::support to stand by a pose
+constexpr float kOutsideVolume = 1000;     // [nats] against a pose outside the working volume
 constexpr int kNearFrames = 30;  // for which a lost object is looked for near its last pose
 constexpr double kRecallPositionSigma = 0.01;  // [m]
 constexpr double kRecallRotationSigma = 0.3;   // [rad]
@@ -158,6 +166,7 @@ class Tracker::Impl {
     particles_ms += millisecondsSince(started);
     const RefinedPose refined = features_.alone() ? refineByFeatures() : refineBest();
     takeOver(refined);
+    if (report_.state == TrackerState::kTracking && weak_frames_ == 0) considerTurned();
     report_.filter_ms = millisecondsSince(started);
     budget_.record(report_.particles, particles_ms, millisecondsSince(begun) - particles_ms);
 
@@ -192,6 +201,7 @@ class Tracker::Impl {
     const std::optional<Pose> known = features_.absolute(frame, regions(belief), pose);
     if (!known && last_seen_ && features_.refuse(pose)) return;
     takeUp(known.value_or(pose), frame.stamp, known.has_value());
+    tracked_frames_ = turned_votes_ = 0;
     appearance_ = {};
     appearance_.bright_inside = std::clamp(found->bright_inside, 0.3, 0.9);
   }
@@ -423,6 +433,53 @@ class Tracker::Impl {
                               appearance_, {3, 2.5}, &exact);
   }
 
+  /// Bodies that look nearly the same turned over or round: now and then the best turned pose is
+  /// held against the one that is tracked, and takes its place if it is better several times.
+  void considerTurned() {
+    if (!object_.symmetry.trivial()) return;  // its likenesses are known
+    ++tracked_frames_;
+    const int period = tracked_frames_ < kYoungFrames ? kYoungPeriod : kOldPeriod;
+    if (tracked_frames_ % period != 0 || features_.support(belief_.pose) > kTrustedLandmarks)
+      return;
+    const std::vector<Pose> turned = search_.turned(belief_.pose);
+    if (turned.empty()) return;
+    std::vector<ParticlePose> poses;
+    for (const Pose& pose : turned) poses.push_back(toParticlePose(pose));
+    std::vector<float> scores(poses.size());
+    measurement_.score(model_, ContourMeasurement::Sharpness::kBlunt, poses.data(), poses.size(),
+                       scores.data());
+    std::vector<std::size_t> order(poses.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const std::size_t count = std::min(kTurnedRefined, order.size());
+    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
+                      order.end(), [&](std::size_t a, std::size_t b) {
+                        return scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
+                      });
+    std::vector<RefinedPose> refined(count + 1);
+    tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t i) {
+      refined[i] = refiner_.refine(model_, measurement_.fields(),
+                                   i < count ? turned[order[i]] : belief_.pose, {}, appearance_,
+                                   {8, 5, 3, 2.5});
+    });
+    const RefinedPose& own = refined.back();
+    const RefinedPose* best = &refined.front();
+    for (std::size_t i = 1; i < count; ++i)
+      if (refined[i].log_likelihood > best->log_likelihood) best = &refined[i];
+    const bool apart = angleBetween(best->camera_from_object.linear(), belief_.pose.linear(),
+                                    object_.symmetry) > kApart;
+    const double margin = kTurnedMargin + kTurnedShare * std::abs(own.log_likelihood);
+    const bool better = apart && best->log_likelihood > own.log_likelihood + margin &&
+                        best->evidence > own.evidence && best->support() > kFoundSupport;
+    turned_votes_ = better ? turned_votes_ + 1 : 0;
+    if (turned_votes_ < kTurnedVotes) return;
+    turned_votes_ = 0;
+    const PoseBelief old = belief_;
+    belief_ = beliefAt(best->camera_from_object, kFoundPositionSigma, kFoundRotationSigma);
+    belief_.velocity = old.velocity;
+    initializeFilter();
+    last_seen_ = remembered_ = belief_.pose;
+  }
+
   void takeOver(const RefinedPose& refined) {
     const double landmark_support = features_.support(refined.camera_from_object);
     report_.support = features_.alone() ? landmark_support : refined.support();
@@ -462,6 +519,8 @@ class Tracker::Impl {
   tbb::task_arena arena_;
   std::array<Eigen::Vector3d, 8> corners_;
   PoseBelief belief_;
+  int tracked_frames_ = 0;  ///< since the last start
+  int turned_votes_ = 0;    ///< looks in a row at which a turned pose was better
   std::optional<Stamp> last_stamp_;
   std::optional<Pose> last_fixed_from_camera_;
   Appearance appearance_;

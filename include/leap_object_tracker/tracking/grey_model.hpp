@@ -19,7 +19,6 @@ class GreyModel {
   /// Mixes new counts in. Histograms of less than 50 samples change nothing.
   /// @param rate share of the new counts, 0 to 1; the first ones count fully
   void learn(const Histogram& inside, const Histogram& outside, double rate);
-  void forget() { known_ = false; }
   bool known() const { return known_; }
 
   /// log p(grey | object) / p(grey | surroundings), within +-2 nats; zero while nothing is known.

@@ -33,6 +33,10 @@ class PoseSearch {
   std::optional<RefinedPose> find(const RectifiedStereoFrame& frame,
                                   const std::optional<Pose>& near);
 
+  /// Poses at the same place in which the object looks nearly as at this one: turned over, or round
+  /// its axes.
+  std::vector<Pose> turned(const Pose& camera_from_object) const;
+
   int orientations() const { return static_cast<int>(orientations_.size()); }
 
  private:
@@ -71,8 +75,8 @@ class PoseSearch {
   RectifiedStereoCamera camera_;
   const ContourModel* model_;
   PoseRefiner refiner_;
-  double surface_ = 0;      ///< [m^2]
-  Eigen::Vector3d middle_;  ///< [m] of the box around the object, in its frame
+  double surface_ = 0;                   ///< [m^2]
+  std::vector<Eigen::Vector3d> pivots_;  ///< [m] of turned()
   Symmetry symmetry_;
   std::vector<Eigen::Matrix3d> turns_;
   std::vector<Eigen::Matrix3d> orientations_;
