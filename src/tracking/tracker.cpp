@@ -29,6 +29,9 @@ double millisecondsSince(Clock::time_point start) {
 
 constexpr double kLongestStep = 0.25;   // [s] longer gaps count as this long
 constexpr int kHypotheses = 4;          // refined a frame
+constexpr double kCommonPixels = 0.1;   // [px] of calibration
+constexpr double kCommonShape = 8e-5;   // [m] of the object's shape
+constexpr double kUnknownSpin = 0.25;   // [rad] of a free axis that nothing binds
 constexpr double kDoubtShare = 0.3;     // of the particles, drawn as if the last pose were wrong
 constexpr double kDoubtReach = 4;       // [px] by which it then lies off
 constexpr double kDoubtCost = 5;        // [nats] against a pose that says so
@@ -174,7 +177,7 @@ class Tracker::Impl {
     PoseEstimate estimate;
     estimate.stamp = frame.stamp;
     estimate.camera_from_object = belief_.pose;
-    estimate.covariance = belief_.poseCovariance();
+    estimate.covariance = covarianceToReport();
     estimate.support = report_.support;
     return estimate;
   }
@@ -282,6 +285,29 @@ class Tracker::Impl {
       regions[eye] = cv::Rect(first, last) & whole;
     }
     return regions;
+  }
+
+  Matrix6d covarianceToReport() const {
+    Matrix6d covariance = belief_.poseCovariance() + common(belief_.pose);
+    if (!object_.symmetry.hasFreeAxis()) return covariance;
+    const Eigen::Vector3d axis = belief_.pose.linear() * object_.symmetry.free_axis;
+    const double spin = axis.dot(covariance.bottomRightCorner<3, 3>() * axis);
+    constexpr double kUniform = M_PI * M_PI / 3;
+    if (spin > kUnknownSpin * kUnknownSpin && spin < kUniform)
+      covariance.bottomRightCorner<3, 3>() += (kUniform - spin) * axis * axis.transpose();
+    return covariance;
+  }
+
+  /// Covariance of what frames do not average out: errors of calibration [px] and of the object's
+  /// own measures and edges [m].
+  Matrix6d common(const Pose& pose) const {
+    const double depth = std::max(0.03, pose.translation().z());
+    const double error = std::hypot(kCommonPixels * depth / camera_.focal_length, kCommonShape);
+    const double along = error * std::clamp(0.5 * depth / model_.radius(), 1.0, 5.0);
+    const double turn = error / model_.radius();
+    Twist deviation;
+    deviation << error, error, along, turn, turn, turn;
+    return deviation.cwiseAbs2().asDiagonal();
   }
 
   /// Covariance of a pose that fits the image only nearly: a few pixels in every direction.

@@ -26,7 +26,7 @@ struct PoseEstimate {
   Pose camera_from_object;  ///< left rectified optical frame from object
   /// Of (x, y, z [m], rotation about x, y, z [rad]), all along the fixed axes of the camera, as in
   /// geometry_msgs/PoseWithCovariance. The free axis of a symmetric object has the variance of a
-  /// uniform angle, pi^2 / 3.
+  /// uniform angle, pi^2 / 3, unless features bind it.
   Matrix6d covariance;
   /// Share of the visible contour that edges of the images support, both eyes together, 0 to 1.
   /// With features alone: of the landmarks that leave no doubt of a pose.
