@@ -168,8 +168,10 @@ void FeatureTracking::conclude(const PoseBelief& belief, bool trusted, double co
   if (!trusted) return;
   refusals_ = 0;
   if (unsure_ && measurement_.features().size() >= kTextured && ++doubts_ > kRefusals) {
+    // The matches of this frame are of the old map.
     measurement_.landmarks().clear();
     unsure_ = false;
+    return;
   }
   if (unsure_) return;
   const Twist deviation = belief.poseCovariance().diagonal().cwiseMax(0).cwiseSqrt();
