@@ -98,7 +98,7 @@ Twist cameraTwistBetween(const Pose& from, const Pose& to) {
 /// How surely a contour between two faces shows. Faces are lit from beside the eyes, so that their
 /// brightness goes with the cosine of the angle at which they are seen (Lambert); nothing can be
 /// said of curved ones.
-double expectedContrast(const ContourPoint& point, const Eigen::Vector3f& to_light) {
+static double expectedContrast(const ContourPoint& point, const Eigen::Vector3f& to_light) {
   float contrast = 0;
   for (const auto& face : point.faces)
     contrast += (&face == &point.faces[0] ? 1.0F : -1.0F) * std::max(0.0F, face.dot(to_light));

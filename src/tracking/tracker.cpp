@@ -57,6 +57,12 @@ constexpr double kRecallRotationSigma = 0.3;   // [rad]
 constexpr double kFoundPositionSigma = 0.003;  // [m]
 constexpr double kFoundRotationSigma = 0.05;   // [rad]
 
+/// [nats] by which a prior speaks against a pose.
+double surprise(const PosePrior& prior, const Pose& pose) {
+  const Twist shift = cameraTwistBetween(prior.mean, pose);
+  return 0.5 * shift.dot(prior.information * shift);
+}
+
 void check(bool right, const char* message) {
   if (!right) throw std::invalid_argument(message);
 }
@@ -351,9 +357,8 @@ class Tracker::Impl {
     const PosePrior prior{belief_.pose, belief_.poseCovariance().inverse()};
     const PosePrior doubted{belief_.pose,
                             (belief_.poseCovariance() + doubt(belief_.pose)).inverse()};
-    const auto surprise = [](const PosePrior& expected, const Pose& pose) {
-      const Twist shift = cameraTwistBetween(expected.mean, pose);
-      return 0.5 * shift.dot(expected.information * shift);
+    const auto expected = [&](const Pose& pose) {
+      return surprise(prior, pose) < kDoubtCost + surprise(doubted, pose);
     };
     const PosePrior with_features = features_.refine(prior);
     std::vector<Pose> starts{belief_.pose};
@@ -377,9 +382,9 @@ class Tracker::Impl {
     // The prediction first; particles that would only lead to the same place are left out.
     std::vector<RefinedPose> refined(starts.size());
     const auto refine = [&](std::size_t i) {
-      const bool expected = surprise(prior, starts[i]) < kDoubtCost + surprise(doubted, starts[i]);
       refined[i] = refiner_.refine(
-          model_, measurement_.fields(), starts[i], expected ? prior : doubted, appearance_,
+          model_, measurement_.fields(), starts[i], expected(starts[i]) ? prior : doubted,
+          appearance_,
           i == 0 && !fresh_ ? std::vector<double>{6, 4, 2.5} : std::vector<double>{8, 5, 3, 2.5});
     };
     RefinedPose by_features;
@@ -417,10 +422,9 @@ class Tracker::Impl {
       if (score(candidate) > score(best)) best = candidate;
     const bool use_features = features_.speak() && score(by_features) >= score(best);
     if (use_features) best = by_features;
-    const bool expected = surprise(prior, best.camera_from_object) <
-                          kDoubtCost + surprise(doubted, best.camera_from_object);
-    if (!expected) belief_.widen(doubt(belief_.pose));
-    polish(best, use_features ? with_features : expected ? prior : doubted);
+    const bool likely = expected(best.camera_from_object);
+    if (!likely) belief_.widen(doubt(belief_.pose));
+    polish(best, use_features ? with_features : likely ? prior : doubted);
     if (use_features) best.information += with_features.information - prior.information;
     return best;
   }
@@ -434,14 +438,12 @@ class Tracker::Impl {
     const PosePrior elsewhere =
         features_.refine(prior, toPose(filter_.poses()[static_cast<std::size_t>(best_particle)]));
     const auto score = [&](const Pose& pose) {
-      const Twist shift = cameraTwistBetween(prior.mean, pose);
-      return features_.score(pose) - 0.5 * shift.dot(prior.information * shift);
+      return features_.score(pose) - surprise(prior, pose);
     };
     const PosePrior& posterior = score(elsewhere.mean) > score(ahead.mean) ? elsewhere : ahead;
     RefinedPose refined;
     refined.camera_from_object = posterior.mean;
     refined.information = posterior.information - prior.information;
-    refined.bright_inside = appearance_.bright_inside;
     return refined;
   }
 
@@ -555,8 +557,8 @@ class Tracker::Impl {
   int frames_lost_ = 0;
   bool fresh_ = false;
   bool confirming_ = false;         ///< the last search found something
-  std::optional<Pose> remembered_;  ///< the same, for as long as it takes
   std::optional<Pose> last_seen_;   ///< where the object was when the tracker stood by it
+  std::optional<Pose> remembered_;  ///< the same, for as long as it takes
 };
 
 Tracker::Tracker(const TrackerParams& params, const ObjectModel& object,
