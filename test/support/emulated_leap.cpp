@@ -54,6 +54,16 @@ const Bytes& noiseTable() {
 
 }  // namespace
 
+EmulatedLeap::Setup EmulatedLeap::Setup::fromBytes(const std::uint8_t* bytes) {
+  Setup setup;
+  setup.type = bytes[0];
+  setup.request = bytes[1];
+  setup.value = static_cast<std::uint16_t>(bytes[2] | bytes[3] << 8);
+  setup.index = static_cast<std::uint16_t>(bytes[4] | bytes[5] << 8);
+  setup.length = static_cast<std::uint16_t>(bytes[6] | bytes[7] << 8);
+  return setup;
+}
+
 EmulatedLeap::EmulatedLeap() : memory_(256, 0), picture_(&EmulatedLeap::noise) {
   setSerial("LP10000000001");
   setCalibration(calibrationOfUnitA());

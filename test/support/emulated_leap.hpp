@@ -26,6 +26,9 @@ class EmulatedLeap {
   struct Setup {
     std::uint8_t type, request;
     std::uint16_t value, index, length;
+
+    /// Reads the 8 bytes of a setup packet (USB 2.0, table 9-2).
+    static Setup fromBytes(const std::uint8_t* bytes);
   };
   struct Request {
     Setup setup;

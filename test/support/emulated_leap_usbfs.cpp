@@ -20,16 +20,6 @@ constexpr unsigned kCapabilities =
 constexpr int kSetupBytes = 8;
 constexpr int kHighSpeed = 3, kFullSpeed = 2;  // enum usb_device_speed
 
-EmulatedLeap::Setup setupFrom(const std::uint8_t* bytes) {
-  EmulatedLeap::Setup setup;
-  setup.type = bytes[0];
-  setup.request = bytes[1];
-  setup.value = static_cast<std::uint16_t>(bytes[2] | bytes[3] << 8);
-  setup.index = static_cast<std::uint16_t>(bytes[4] | bytes[5] << 8);
-  setup.length = static_cast<std::uint16_t>(bytes[6] | bytes[7] << 8);
-  return setup;
-}
-
 /// Of the calling thread.
 std::int64_t cpuNanoseconds() {
   timespec time;
@@ -169,7 +159,7 @@ int EmulatedUsbfs::submit(usbdevfs_urb* user) {
 }
 
 int EmulatedUsbfs::submitControl(const UrbPtr& urb) {
-  const EmulatedLeap::Setup setup = setupFrom(urb->data.data());
+  const EmulatedLeap::Setup setup = EmulatedLeap::Setup::fromBytes(urb->data.data());
   const int result = leap_.control(setup, urb->data.data() + kSetupBytes);
   changed_.notify_all();
   if (result == EmulatedLeap::kNoReply) {

@@ -143,12 +143,7 @@ void EmulatedVhci::readRequests() {
 }
 
 void EmulatedVhci::answerControl(Request& request, const std::uint8_t* bytes) {
-  EmulatedLeap::Setup setup;
-  setup.type = bytes[0];
-  setup.request = bytes[1];
-  setup.value = static_cast<std::uint16_t>(bytes[2] | bytes[3] << 8);
-  setup.index = static_cast<std::uint16_t>(bytes[4] | bytes[5] << 8);
-  setup.length = static_cast<std::uint16_t>(bytes[6] | bytes[7] << 8);
+  const auto setup = EmulatedLeap::Setup::fromBytes(bytes);
   request.data.resize(std::max<std::size_t>(request.data.size(), setup.length));
   const int result = leap_->control(setup, request.data.data());
   if (result == EmulatedLeap::kNoReply) {
