@@ -8,7 +8,9 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <stdexcept>
 #include <tuple>
 
@@ -122,6 +124,69 @@ double diameterOf(const Mesh& mesh) {
     if (low != nullptr) largest = std::max(largest, (*high - *low).norm());
   }
   return largest;
+}
+
+ShadowArea shadowAreaOf(const Mesh& mesh) {
+  constexpr int kPoints = 6000, kDirections = 60, kCells = 40;  // along the diameter
+  std::vector<double> areas;
+  for (const auto& t : mesh.triangles)
+    areas.push_back((mesh.vertices[t[1]] - mesh.vertices[t[0]])
+                        .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]])
+                        .norm());
+  const double step = std::accumulate(areas.begin(), areas.end(), 0.0) / kPoints;
+  if (!(step > 0)) return {};
+  // Evenly spread: one a share of the area, in a low-discrepancy sequence within the triangle
+  // (Roberts 2018, R2).
+  std::vector<Eigen::Vector3d> points;
+  double due = 0.5 * step;
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    const auto& t = mesh.triangles[i];
+    for (; due < areas[i]; due += step) {
+      const auto number = static_cast<double>(points.size());
+      double a = std::fmod(0.7548776662466927 * number, 1.0);
+      double b = std::fmod(0.5698402909980532 * number, 1.0);
+      if (a + b > 1) a = 1 - a, b = 1 - b;
+      const Eigen::Vector3d& origin = mesh.vertices[t[0]];
+      points.push_back(origin + a * (mesh.vertices[t[1]] - origin) +
+                       b * (mesh.vertices[t[2]] - origin));
+    }
+    due -= areas[i];
+  }
+  const double radius = radiusOf(mesh), cell = 2 * radius / kCells;
+  ShadowArea shadow;
+  shadow.least = std::numeric_limits<double>::infinity();
+  std::vector<bool> covered;
+  for (int i = 0; i < kDirections; ++i) {
+    const double z = 1 - (2 * i + 1.0) / kDirections, ring = std::sqrt(1 - z * z);
+    const double angle = i * M_PI * (3 - std::sqrt(5.0));
+    const Eigen::Matrix3d turn =
+        Eigen::Quaterniond::FromTwoVectors(
+            Eigen::Vector3d(ring * std::cos(angle), ring * std::sin(angle), z),
+            Eigen::Vector3d::UnitZ())
+            .toRotationMatrix();
+    covered.assign((kCells + 1) * (kCells + 1), false);
+    for (const auto& point : points) {
+      const Eigen::Vector3d seen = turn * point;
+      const auto column = static_cast<std::size_t>((seen.x() + radius) / cell);
+      const auto row = static_cast<std::size_t>((seen.y() + radius) / cell);
+      covered[row * (kCells + 1) + column] = true;
+    }
+    // Cells at the border are half covered.
+    double inside = 0;
+    for (std::size_t row = 1; row < kCells; ++row)
+      for (std::size_t column = 1; column < kCells; ++column) {
+        const auto at = [&](std::size_t r, std::size_t c) { return covered[r * (kCells + 1) + c]; };
+        if (!at(row, column)) continue;
+        const int free_sides = !at(row - 1, column) + !at(row + 1, column) + !at(row, column - 1) +
+                               !at(row, column + 1);
+        inside += free_sides > 0 ? 0.5 : 1;
+      }
+    const double area = inside * cell * cell;
+    shadow.least = std::min(shadow.least, area);
+    shadow.largest = std::max(shadow.largest, area);
+    shadow.mean += area / kDirections;
+  }
+  return shadow;
 }
 
 }  // namespace leap_object_tracker

@@ -10,17 +10,20 @@ namespace {
 constexpr int kMargin = GainMap::kMargin;
 constexpr int kStampRow = 32;       // [bytes]
 constexpr double kSmoothing = 1.0;  // [px]
+constexpr double kLeastNoise = 4;   // of a Sobel response: images are rounded to grey levels
 
-/// Grey levels to a scale on which shot and read noise look the same everywhere (Anscombe 1948,
-/// generalised: sqrt(x + offset)).
+// Grey levels to a scale on which shot and read noise look the same everywhere (Anscombe 1948,
+// generalised): kStabilizedScale * sqrt(x + kStabilizedOffset).
+constexpr double kStabilizedOffset = 6;
+const double kStabilizedScale =
+    255 / (std::sqrt(255 + kStabilizedOffset) - std::sqrt(kStabilizedOffset));
+
 const cv::Mat& varianceStabilizer() {
   static const cv::Mat table = [] {
-    constexpr double kOffset = 6;
     cv::Mat values(1, 256, CV_8UC1);
-    const double scale = 255 / (std::sqrt(255 + kOffset) - std::sqrt(kOffset));
     for (int i = 0; i < 256; ++i)
-      values.at<std::uint8_t>(i) =
-          cv::saturate_cast<std::uint8_t>(scale * (std::sqrt(i + kOffset) - std::sqrt(kOffset)));
+      values.at<std::uint8_t>(i) = cv::saturate_cast<std::uint8_t>(
+          kStabilizedScale * (std::sqrt(i + kStabilizedOffset) - std::sqrt(kStabilizedOffset)));
     return values;
   }();
   return table;
@@ -66,8 +69,15 @@ void EdgeField::build(const cv::Mat& image, const cv::Rect& region) {
   cv::Sobel(stabilized_, dv_, CV_16S, 0, 1, 3);
 
   constexpr float kWeakest = 20;  // a step of 5 grey levels of 255 after smoothing
-  gradient_noise_ = std::max(robustDeviation(du_), robustDeviation(dv_));
-  const float high = std::max(kWeakest, 5.0F * gradient_noise_);
+  const float noise = std::max(robustDeviation(du_), robustDeviation(dv_));
+  // A Sobel response is 8 slopes; back from the stabilised scale by its derivative.
+  const auto slope_noise =
+      static_cast<float>(std::max(kLeastNoise, static_cast<double>(noise)) / 8 / kStabilizedScale);
+  for (std::size_t grey = 0; grey < slope_noise_.size(); ++grey)
+    slope_noise_[grey] =
+        2 * slope_noise *
+        std::sqrt(static_cast<float>(grey) + static_cast<float>(kStabilizedOffset));
+  const float high = std::max(kWeakest, 5.0F * noise);
   cv::Canny(du_, dv_, edges_, 0.4F * high, high, true);
 
   for (int v = 0; v < edges_.rows; ++v) {

@@ -1,7 +1,10 @@
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "leap_object_tracker/tracking/edge_profile.hpp"
 
@@ -11,6 +14,7 @@ namespace {
 constexpr double kNearest = 0.01;         // [m]
 constexpr double kIndependentLength = 3;  // [px] of contour that one independent edge sample needs
 constexpr double kSupportDistance = 1.5;  // [px]
+constexpr float kVisibleSlope = 3;        // [noise] of an edge that is taken for one
 constexpr int kLongestRange = 24;         // [px]
 constexpr float kClearance = 16;          // [px] lines farther apart do not disturb each other
 constexpr float kAlongside = 4;           // [px]
@@ -190,7 +194,6 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
     turn(0, 1) = -choice.sine;
     turn(1, 0) = choice.sine;
     const Eigen::Matrix3d rotation = pose.linear() * turn;
-    const float weakest = std::max(1.0F, 0.5F * field.gradientNoise());
 
     const std::size_t first = matches.size();
     for (const ContourPoint& point : choice.view->points) {
@@ -284,6 +287,8 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         const float blur = static_cast<float>(std::max(1.0, 0.5 * own_range));
         for (int k = std::max(low + 2, -reach); k <= std::min(high - 2, reach); ++k) {
           const float here = slope(k), size = std::abs(here);
+          const float weakest =
+              kVisibleSlope * field.slopeNoise(profile[static_cast<std::size_t>(k + span)]);
           if (size < weakest) continue;
           const float before = slope(k - 1), after = slope(k + 1);
           const float sign = here > 0 ? 1.0F : -1.0F;
@@ -467,6 +472,21 @@ void PoseRefiner::learn(const ContourModel& model, const std::array<EdgeField, 2
   appearance.grey.learn(inside, outside, kLearningRate);
   appearance.bright_inside = std::clamp(
       appearance.bright_inside + 0.1 * (bright / judged - appearance.bright_inside), 0.2, 0.95);
+}
+
+void refineExactly(const PoseRefiner& refiner, const ContourModel& model,
+                   const std::array<EdgeField, 2>& fields, double baseline, const PosePrior& prior,
+                   const Appearance& appearance, RefinedPose& refined) {
+  std::array<std::optional<ContourView>, 2> views;
+  tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
+    Eigen::Vector3d origin = refined.camera_from_object.translation();
+    if (eye == 1) origin.x() -= baseline;
+    views[eye] = model.exactView(-(refined.camera_from_object.linear().transpose() * origin));
+  });
+  if (!views[0] || !views[1]) return;
+  const std::array<ContourView, 2> exact{*std::move(views[0]), *std::move(views[1])};
+  refined = refiner.refine(model, fields, refined.camera_from_object, prior, appearance, {3, 2.5},
+                           &exact);
 }
 
 }  // namespace leap_object_tracker

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 #include "tracking/random.hpp"
@@ -13,18 +14,27 @@ namespace leap_object_tracker {
 namespace {
 
 constexpr int kOrientations = 4400;  // about 15 deg apart over all of SO(3)
-constexpr int kMostPlaces = 14;
+constexpr std::size_t kMostPlaces = 10;
+constexpr double kWorstArea = 1.4;  // log of the ratio to the object's largest or least shadow
+constexpr double kDoubtOfOneEye = 0.5, kDoubtOfClosing = 0.1;
+constexpr double kTrustOfContrast = 0.3;   // a doubling of the thresholds that a region stands
 constexpr std::size_t kTurned = 24;        // of the turned poses that are refined
-constexpr int kBoxPoints = 64;             // of the contour, for the box around it
-constexpr double kOtherShape = 0.5;        // log of the ratio of elongations
+constexpr int kHullPoints = 64;            // of the contour, for how far it reaches
+constexpr float kFewestDirections = 6;     // in which a region's reach must be known
+constexpr float kLeastGrowth = 0.7F;       // of the projection, to fit a region
+constexpr float kHullSpread = 1.5F;        // [px] of a region's reach
+constexpr float kWorstHull = 3;            // [nats] of one direction
+constexpr float kIndependentHull = 0.5F;   // share of directions that speak independently
 constexpr int kCoarsePoints = 32;          // of the contour, for the first look
-constexpr std::size_t kLikelyPlaces = 3;   // first by how well their blob fits
-constexpr std::size_t kKeptAtLikely = 40;  // hypotheses of such a place that move on
+constexpr std::size_t kLikelyPlaces = 3;   // first by how well their region fits
+constexpr std::size_t kKeptAtLikely = 30;  // hypotheses of such a place that move on
 constexpr std::size_t kKeptElsewhere = 8;
 constexpr int kChildren = 20;  // random steps of each, a round
 constexpr int kRounds = 4;
 constexpr std::size_t kRefinedAtLikely = 8;
 constexpr std::size_t kRefinedElsewhere = 2;
+constexpr std::size_t kPromising = 16;         // poses that are refined to the end
+constexpr std::size_t kExactlySeen = 8;        // of the turned poses that are compared at last
 constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 // Of the best score that so much contour could have: less speaks against a pose. Without it, views
 // that show more contour would win.
@@ -133,15 +143,6 @@ std::vector<Eigen::Vector3d> pivotsOf(const Mesh& mesh) {
   return pivots;
 }
 
-double surfaceOf(const Mesh& mesh) {
-  double doubled = 0;
-  for (const auto& t : mesh.triangles)
-    doubled += (mesh.vertices[t[1]] - mesh.vertices[t[0]])
-                   .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]])
-                   .norm();
-  return doubled / 2;
-}
-
 }  // namespace
 
 PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
@@ -150,72 +151,53 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       camera_(camera),
       model_(&model),
       refiner_(params.contour, camera),
-      surface_(surfaceOf(object.mesh)),
+      shadow_(shadowAreaOf(object.mesh)),
       pivots_(pivotsOf(object.mesh)),
       symmetry_(object.symmetry),
       turns_(turnsToTry(object.symmetry)),
       orientations_(distinctRotations(object.symmetry, kOrientations)) {}
 
-std::vector<PoseSearch::Blob> PoseSearch::findBlobs(const cv::Mat& image) const {
-  std::vector<Blob> blobs;
-  if (image.empty()) return blobs;
-  cv::Mat half, mask, labels, statistics, centroids;
-  cv::resize(image, half, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
-  for (const int threshold : {12, 20, 32, 50, 80, 120, 170}) {
-    mask = half > threshold;
-    const int count = cv::connectedComponentsWithStats(mask, labels, statistics, centroids, 8);
-    for (int i = 1; i < count; ++i) {
-      Blob blob;
-      blob.area = 4.0 * statistics.at<int>(i, cv::CC_STAT_AREA);
-      if (blob.area < 40) continue;
-      blob.left = 2.0 * statistics.at<int>(i, cv::CC_STAT_LEFT);
-      blob.top = 2.0 * statistics.at<int>(i, cv::CC_STAT_TOP);
-      blob.width = 2.0 * statistics.at<int>(i, cv::CC_STAT_WIDTH);
-      blob.height = 2.0 * statistics.at<int>(i, cv::CC_STAT_HEIGHT);
-      blob.u = 2 * centroids.at<double>(i, 0) + 0.5;
-      blob.v = 2 * centroids.at<double>(i, 1) + 0.5;
-      blob.threshold = threshold;
-      blobs.push_back(blob);
-    }
-  }
-  return blobs;
-}
-
 std::vector<PoseSearch::Place> PoseSearch::findPlaces(const RectifiedStereoFrame& frame) const {
   std::vector<Place> places;
   const double focal = camera_.focal_length;
   const bool left_used = params_.eyes != Eyes::kRight && !frame.left.empty();
-  const std::vector<Blob> left = left_used ? findBlobs(frame.left) : std::vector<Blob>();
-  const std::vector<Blob> right =
-      params_.eyes != Eyes::kLeft ? findBlobs(frame.right) : std::vector<Blob>();
-  const auto add = [&](const Blob& blob, double depth, double doubt, double eye_x) {
+  std::array<std::vector<BrightRegion>, 2> regions;
+  tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
+    if (eye == 0 ? left_used : params_.eyes != Eyes::kLeft)
+      regions[eye] = findBrightRegions(eye == 0 ? frame.left : frame.right);
+  });
+  const auto add = [&](const BrightRegion& region, double depth, double doubt, double eye_x) {
     if (depth < params_.volume.nearest || depth > params_.volume.farthest) return;
-    const double expected = surface_ / 4 * focal * focal / (depth * depth);
-    const double misfit = std::abs(std::log(blob.area / expected));
-    if (misfit > std::log(4.0)) return;
-    places.push_back({{eye_x + (blob.u - camera_.center_u) * depth / focal,
-                       (blob.v - camera_.center_v) * depth / focal, depth},
-                      misfit + doubt,
-                      blob,
+    const double area = region.area * depth * depth / (focal * focal);
+    const double misfit = std::log(std::max({1.0, area / shadow_.largest, shadow_.least / area}));
+    if (misfit > kWorstArea) return;
+    doubt += misfit + kDoubtOfClosing * region.closing -
+             kTrustOfContrast * std::min(3.0, std::log2(region.brightest / region.faintest));
+    places.push_back({{eye_x + (region.middleU() - camera_.center_u) * depth / focal,
+                       (region.middleV() - camera_.center_v) * depth / focal, depth},
+                      doubt,
+                      region,
                       eye_x});
   };
   const double half_radius = 0.35 * model_->radius();
-  for (const Blob& blob : left) {
-    for (const Blob& other : right) {
-      if (other.threshold != blob.threshold) continue;
-      if (std::abs(other.v - blob.v) > 4 + 0.25 * blob.height) continue;
-      if (std::abs(std::log(other.area / blob.area)) > 0.7) continue;
-      const double disparity = blob.u - other.u;
+  for (const BrightRegion& region : regions[0]) {
+    for (const BrightRegion& other : regions[1]) {
+      if (other.closing != region.closing || other.faintest > region.brightest ||
+          other.brightest < region.faintest)
+        continue;
+      const double lower = std::abs(other.middleV() - region.middleV());
+      const double larger = std::abs(std::log(other.area / region.area));
+      if (lower > 4 + 0.25 * (region.high_v - region.low_v) || larger > 0.7) continue;
+      const double disparity = region.middleU() - other.middleU();
       if (disparity < 2) continue;
-      // The blob is the near side of the object.
-      add(blob, focal * camera_.baseline / disparity + half_radius,
-          std::abs(std::log(other.area / blob.area)) + std::abs(other.v - blob.v) / 20, 0);
+      // The region is the near side of the object.
+      add(region, focal * camera_.baseline / disparity + half_radius, larger + lower / 20, 0);
     }
-    add(blob, focal * std::sqrt(surface_ / 4 / blob.area), 0.5, 0);
+    add(region, focal * std::sqrt(shadow_.mean / region.area), kDoubtOfOneEye, 0);
   }
   if (!left_used)
-    for (const Blob& blob : right)
-      add(blob, focal * std::sqrt(surface_ / 4 / blob.area), 0.5, camera_.baseline);
+    for (const BrightRegion& region : regions[1])
+      add(region, focal * std::sqrt(shadow_.mean / region.area), kDoubtOfOneEye, camera_.baseline);
 
   std::sort(places.begin(), places.end(),
             [](const Place& a, const Place& b) { return a.doubt < b.doubt; });
@@ -233,7 +215,7 @@ std::vector<PoseSearch::Place> PoseSearch::findPlaces(const RectifiedStereoFrame
 
 /// What one eye sees of the first `points` of the contour at a pose.
 std::optional<PoseSearch::Glance> PoseSearch::glance(const ParticlePose& pose, double eye_x,
-                                                     int points) const {
+                                                     int points, bool extents) const {
   using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
   const Eigen::Map<const RowMajor> object_rotation(pose.rotation.data());
   const Eigen::Vector3f origin(pose.translation[0] - static_cast<float>(eye_x), pose.translation[1],
@@ -252,12 +234,14 @@ std::optional<PoseSearch::Glance> PoseSearch::glance(const ParticlePose& pose, d
                            values[(first + 2) * count + i]);
   };
   Glance seen;
+  seen.extents.setConstant(-1e9F);
   for (std::size_t i = 0; i < static_cast<std::size_t>(points); ++i) {
     const Eigen::Vector3f at = origin + rotation * column(0, i);
     if (at.z() < 0.02F) return std::nullopt;
     const Eigen::Array2f slope = at.head<2>().array() / at.z();
-    seen.low = seen.low.min(slope);
-    seen.high = seen.high.max(slope);
+    if (extents)
+      seen.extents =
+          seen.extents.max(BrightRegion::cosines() * slope.x() + BrightRegion::sines() * slope.y());
     const Eigen::Vector3f along = rotation * column(3, i);
     seen.length += (along.head<2>().array() - slope * along.z()).matrix().norm() / at.z();
   }
@@ -265,30 +249,54 @@ std::optional<PoseSearch::Glance> PoseSearch::glance(const ParticlePose& pose, d
   return seen;
 }
 
-/// Moves a pose until the box around its contour has the centre and the area of the blob's; nothing
-/// if it is of another shape altogether.
-std::optional<Pose> PoseSearch::fitToBox(const Pose& pose, const Place& place) const {
+/// [nats] by which the reach of a region speaks against a pose.
+float PoseSearch::hullDoubt(const Glance& seen, const BrightRegion& region) const {
+  const auto focal = static_cast<float>(camera_.focal_length);
+  const BrightRegion::Extents apart =
+      region.extents - focal * seen.extents -
+      BrightRegion::cosines() * static_cast<float>(camera_.center_u) -
+      BrightRegion::sines() * static_cast<float>(camera_.center_v);
+  const auto size = static_cast<float>(std::sqrt(region.area));
+  const float spread = kHullSpread + 0.02F * size;
+  return (region.known * (0.5F * (apart / spread).square()).min(kWorstHull)).sum() *
+         kIndependentHull;
+}
+
+/// Moves a pose until its outline reaches as far as the region in all directions, as well as can be
+/// with a shift in the image and another depth: least squares of the extents.
+std::optional<Pose> PoseSearch::fitToRegion(const Pose& pose, const Place& place) const {
   const std::optional<Glance> seen =
-      glance(toParticlePose(pose), place.eye_x, std::min(kBoxPoints, model_->points()));
+      glance(toParticlePose(pose), place.eye_x, std::min(kHullPoints, model_->points()), true);
   if (!seen) return std::nullopt;
-  const Eigen::Array2f low = seen->low, high = seen->high;
+  using Extents = BrightRegion::Extents;
+  const Extents &c = BrightRegion::cosines(), &s = BrightRegion::sines();
+  const Extents& weight = place.region.known;
+  if (weight.sum() < kFewestDirections) return std::nullopt;
+  const auto focal = static_cast<float>(camera_.focal_length);
+  const Extents wanted = (place.region.extents - c * static_cast<float>(camera_.center_u) -
+                          s * static_cast<float>(camera_.center_v)) /
+                         focal;
   const Eigen::Vector3d origin = pose.translation() - Eigen::Vector3d(place.eye_x, 0, 0);
-  const double focal = camera_.focal_length;
-  const Eigen::Array2d size = (high - low).cast<double>() * focal;
-  const Eigen::Array2d middle = 0.5 * (high + low).cast<double>();
-  const double elongation =
-      std::log(size.x() / size.y()) - std::log(place.blob.width / place.blob.height);
-  if (!(std::abs(elongation) < kOtherShape)) return std::nullopt;
-  const double grown =
-      std::clamp(std::sqrt(size.x() * size.y() / (place.blob.width * place.blob.height)), 0.7, 1.4);
-  const Eigen::Array2d wanted(
-      (place.blob.left + 0.5 * (place.blob.width - 1) - camera_.center_u) / focal,
-      (place.blob.top + 0.5 * (place.blob.height - 1) - camera_.center_v) / focal);
-  const Eigen::Array2d own = origin.head<2>().array() / origin.z();
+  const Eigen::Array2f own = (origin.head<2>() / origin.z()).cast<float>().array();
+  const Extents reach = seen->extents - c * own.x() - s * own.y();
+  // wanted = grown * reach + c x + s y
+  Eigen::Matrix<float, BrightRegion::kDirections, 3> columns;
+  columns << reach, c, s;
+  const Eigen::Matrix<float, 3, BrightRegion::kDirections> weighted =
+      columns.transpose() * weight.matrix().asDiagonal();
+  Eigen::Matrix3f normal = weighted * columns;
+  Eigen::Vector3f right = weighted * wanted.matrix();
+  Eigen::Vector3f found = normal.ldlt().solve(right);
+  if (!(found[0] > kLeastGrowth && found[0] < 1 / kLeastGrowth)) {
+    found[0] = found[0] > 1 ? 1 / kLeastGrowth : kLeastGrowth;
+    found.tail<2>() = normal.bottomRightCorner<2, 2>().ldlt().solve(
+        right.tail<2>() - normal.bottomLeftCorner<2, 1>() * found[0]);
+  }
+  if (!found.allFinite()) return std::nullopt;
   Pose fitted = pose;
-  const double depth = pose.translation().z() * grown;
-  const Eigen::Array2d moved = (wanted + (own - middle) / grown) * depth;
-  fitted.translation() << moved.x() + place.eye_x, moved.y(), depth;
+  const double depth = pose.translation().z() / static_cast<double>(found[0]);
+  fitted.translation() << static_cast<double>(found[1]) * depth + place.eye_x,
+      static_cast<double>(found[2]) * depth, depth;
   return fitted;
 }
 
@@ -299,7 +307,8 @@ const std::array<GainMap, 2>& PoseSearch::mapsFor(double depth, int sharpening) 
 }
 
 void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses, int points,
-                          const std::array<GainMap, 2>& maps) const {
+                          const std::array<GainMap, 2>& maps,
+                          const std::vector<Place>& places) const {
   std::array<EyeView, 2> eyes;
   for (std::size_t eye = 0; eye < 2; ++eye) {
     if (fields_[eye].seen()) eyes[eye].map = &maps[eye];
@@ -316,10 +325,14 @@ void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses, int points,
                         Hypothesis& hypothesis = hypotheses[i];
                         scoreContours(*model_, points, eyes.data(), eyes.size(), kIndependentShare,
                                       &hypothesis.pose, 1, &hypothesis.score);
-                        const auto seen = glance(hypothesis.pose, 0, points);
-                        if (seen)
-                          hypothesis.score -= kToBeExpected * kBlunt.log_ratio * kIndependentShare *
-                                              seen->length * static_cast<float>(eye_count);
+                        const Place* place =
+                            hypothesis.place < places.size() ? &places[hypothesis.place] : nullptr;
+                        const auto seen = glance(hypothesis.pose, place ? place->eye_x : 0, points,
+                                                 place != nullptr);
+                        if (!seen) continue;
+                        hypothesis.score -= kToBeExpected * kBlunt.log_ratio * kIndependentShare *
+                                            seen->length * static_cast<float>(eye_count);
+                        if (place) hypothesis.score -= hullDoubt(*seen, place->region);
                       }
                     });
 }
@@ -381,11 +394,10 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       Pose pose = Pose::Identity();
       pose.translation() = place;
       pose.linear() = facing * orientation;
-      hypotheses.push_back({toParticlePose(pose), 0, index});
-      if (const auto fitted = fitToBox(pose, places[index]))
-        hypotheses.push_back({toParticlePose(*fitted), 0, index});
+      const std::optional<Pose> fitted = fitToRegion(pose, places[index]);
+      hypotheses.push_back({toParticlePose(fitted.value_or(pose)), 0, index});
     }
-    scoreAll(hypotheses, kCoarsePoints, mapsFor(place.z(), 1));
+    scoreAll(hypotheses, kCoarsePoints, mapsFor(place.z(), 1), places);
     keepDistinct(hypotheses, index < kLikelyPlaces ? kKeptAtLikely : kKeptElsewhere, 0.2);
     kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
   }
@@ -401,7 +413,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
                   static_cast<double>(normals[static_cast<std::size_t>(k)]);
       hypotheses.push_back({toParticlePose(movedInCamera(*near, step)), 0, places.size()});
     }
-    scoreAll(hypotheses, kCoarsePoints, mapsFor(std::max(0.03, near->translation().z())));
+    scoreAll(hypotheses, kCoarsePoints, mapsFor(std::max(0.03, near->translation().z())), places);
     keepDistinct(hypotheses, kKeptAtLikely, 0.1);
     kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
   }
@@ -428,7 +440,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
                           (size * 0.03 * depth * static_cast<double>(normals[2]));
         children.push_back({toParticlePose(movedInCamera(parent, step)), 0, kept[i].place});
       }
-      scoreAll(children, model_->points(), mapsFor(depth, round));
+      scoreAll(children, model_->points(), mapsFor(depth, round), places);
       kept[i] = *std::max_element(
           children.begin(), children.end(),
           [](const Hypothesis& a, const Hypothesis& b) { return a.score < b.score; });
@@ -441,40 +453,61 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     while (last < kept.size() && kept[last].place == kept[first].place) ++last;
     std::vector<Hypothesis> here(kept.begin() + static_cast<std::ptrdiff_t>(first),
                                  kept.begin() + static_cast<std::ptrdiff_t>(last));
-    keepDistinct(here, here.size() > kKeptElsewhere ? kRefinedAtLikely : kRefinedElsewhere, 0.15);
+    keepDistinct(here, here.size() > kKeptElsewhere ? kRefinedAtLikely : kRefinedElsewhere, 0.3);
     for (const Hypothesis& hypothesis : here) starts.push_back(toPose(hypothesis.pose));
     first = last;
   }
   std::vector<RefinedPose> refined(starts.size());
-  tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
-    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 8, 6, 4, 3, 2.5});
-  });
   const auto less = [](const RefinedPose& a, const RefinedPose& b) {
     return a.evidence < b.evidence;
   };
+  tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
+    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 8, 6});
+  });
+  const std::size_t promising = std::min(kPromising, refined.size());
+  std::partial_sort(refined.begin(), refined.begin() + static_cast<std::ptrdiff_t>(promising),
+                    refined.end(), [&](const auto& a, const auto& b) { return less(b, a); });
+  refined.resize(promising);
+  tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t i) {
+    refined[i] =
+        refiner_.refine(*model_, fields_, refined[i].camera_from_object, {}, {}, {4, 3, 2.5});
+  });
   auto best = std::max_element(refined.begin(), refined.end(), less);
   // A body that looks nearly the same turned over or round may have been taken for it.
   const RefinedPose first = *best;
   const double first_depth = std::max(0.03, first.camera_from_object.translation().z());
   hypotheses.clear();
   for (const Pose& pose : turned(first.camera_from_object))
-    hypotheses.push_back({toParticlePose(pose), 0, 0});
-  scoreAll(hypotheses, model_->points(), mapsFor(first_depth, 2));
+    hypotheses.push_back({toParticlePose(pose), 0, places.size()});
+  scoreAll(hypotheses, model_->points(), mapsFor(first_depth, 2), places);
   keepDistinct(hypotheses, kTurned, 0.15);
   starts.clear();
   for (const Hypothesis& hypothesis : hypotheses) starts.push_back(toPose(hypothesis.pose));
   starts.push_back(first.camera_from_object);
   refined.resize(starts.size());
-  // Most of the silhouette is right already: it tells what is object and what is not.
-  Appearance looks;
-  refiner_.learn(*model_, fields_, first.camera_from_object, looks);
+  // What is object and what is not, each says for itself.
+  std::vector<Appearance> looks(starts.size());
+  std::vector<std::size_t> order(starts.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
-    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, looks, {10, 7, 4, 3, 2.5});
+    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 7, 4});
+    refiner_.learn(*model_, fields_, refined[i].camera_from_object, looks[i]);
+    refined[i] =
+        refiner_.refine(*model_, fields_, refined[i].camera_from_object, {}, looks[i], {3, 2.5});
   });
-  best = std::max_element(refined.begin(), refined.end(),
-                          [](const RefinedPose& a, const RefinedPose& b) {
-                            return a.log_likelihood < b.log_likelihood;
-                          });
+  const auto likelier = [&](std::size_t a, std::size_t b) {
+    return refined[a].log_likelihood > refined[b].log_likelihood;
+  };
+  const std::size_t last_round = std::min(kExactlySeen, order.size());
+  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(last_round),
+                    order.end(), likelier);
+  order.resize(last_round);
+  tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) {
+    refineExactly(refiner_, *model_, fields_, camera_.baseline, {}, looks[order[i]],
+                  refined[order[i]]);
+  });
+  best = refined.begin() +
+         static_cast<std::ptrdiff_t>(*std::min_element(order.begin(), order.end(), likelier));
   const double depth = best->camera_from_object.translation().z();
   if (depth < params_.volume.nearest || depth > params_.volume.farthest) return std::nullopt;
   return *best;

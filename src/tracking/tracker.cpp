@@ -424,7 +424,11 @@ class Tracker::Impl {
     if (use_features) best = by_features;
     const bool likely = expected(best.camera_from_object);
     if (!likely) belief_.widen(doubt(belief_.pose));
-    polish(best, use_features ? with_features : likely ? prior : doubted);
+    refineExactly(refiner_, model_, measurement_.fields(), camera_.baseline,
+                  use_features ? with_features
+                  : likely     ? prior
+                               : doubted,
+                  appearance_, best);
     if (use_features) best.information += with_features.information - prior.information;
     return best;
   }
@@ -445,20 +449,6 @@ class Tracker::Impl {
     refined.camera_from_object = posterior.mean;
     refined.information = posterior.information - prior.information;
     return refined;
-  }
-
-  /// Refines once more on the contour of exactly this view, where the model knows only one nearby.
-  void polish(RefinedPose& refined, const PosePrior& prior) const {
-    std::array<std::optional<ContourView>, 2> views;
-    tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
-      Eigen::Vector3d origin = refined.camera_from_object.translation();
-      if (eye == 1) origin.x() -= camera_.baseline;
-      views[eye] = model_.exactView(-(refined.camera_from_object.linear().transpose() * origin));
-    });
-    if (!views[0] || !views[1]) return;
-    const std::array<ContourView, 2> exact{*std::move(views[0]), *std::move(views[1])};
-    refined = refiner_.refine(model_, measurement_.fields(), refined.camera_from_object, prior,
-                              appearance_, {3, 2.5}, &exact);
   }
 
   /// Bodies that look nearly the same turned over or round: now and then the best turned pose is

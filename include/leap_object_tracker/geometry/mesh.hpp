@@ -33,4 +33,11 @@ double radiusOf(const Mesh& mesh);
 /// most).
 double diameterOf(const Mesh& mesh);
 
+/// Area of the shadow that a body throws in parallel light [m^2], over directions all around.
+struct ShadowArea {
+  double least = 0, mean = 0, largest = 0;
+};
+/// To about 5 %, from points on the surface.
+ShadowArea shadowAreaOf(const Mesh& mesh);
+
 }  // namespace leap_object_tracker

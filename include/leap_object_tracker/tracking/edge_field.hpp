@@ -65,15 +65,18 @@ class EdgeField {
     std::uint8_t direction;  ///< of the edge line, 0 to 255 for 0 to 180 deg, from +u towards +v
   };
   const std::vector<Edgel>& edgels() const { return edgels_; }
-  /// Noise of the smoothed image's gradient [grey levels per pixel] where the image is dark.
-  float gradientNoise() const { return gradient_noise_; }
+  /// Standard deviation of the smoothed image's slope [grey levels per pixel] where it has this
+  /// grey level: read noise and shot noise together.
+  float slopeNoise(float grey) const {
+    return slope_noise_[static_cast<std::uint8_t>(grey < 0 ? 0 : grey > 255 ? 255 : grey)];
+  }
 
  private:
   cv::Rect region_;
   cv::Size image_size_;
   cv::Mat image_, padded_, smooth_, stabilized_, du_, dv_, edges_;
   std::vector<Edgel> edgels_;
-  float gradient_noise_ = 0;
+  std::array<float, 256> slope_noise_{};
 };
 
 }  // namespace leap_object_tracker

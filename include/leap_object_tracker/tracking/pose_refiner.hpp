@@ -80,4 +80,10 @@ class PoseRefiner {
   RectifiedStereoCamera camera_;
 };
 
+/// Refines once more on the contour of exactly this view, where the model knows only one nearby.
+/// @param baseline [m] of the eyes
+void refineExactly(const PoseRefiner& refiner, const ContourModel& model,
+                   const std::array<EdgeField, 2>& fields, double baseline, const PosePrior& prior,
+                   const Appearance& appearance, RefinedPose& refined);
+
 }  // namespace leap_object_tracker

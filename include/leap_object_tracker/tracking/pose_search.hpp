@@ -7,6 +7,7 @@
 #include "leap_object_tracker/geometry/object_model.hpp"
 #include "leap_object_tracker/geometry/stereo_camera.hpp"
 #include "leap_object_tracker/geometry/stereo_frame.hpp"
+#include "leap_object_tracker/tracking/bright_regions.hpp"
 #include "leap_object_tracker/tracking/contour_kernel.hpp"
 #include "leap_object_tracker/tracking/contour_model.hpp"
 #include "leap_object_tracker/tracking/edge_field.hpp"
@@ -17,9 +18,8 @@ namespace leap_object_tracker {
 
 /// Finds an object anywhere in the working volume, in one frame.
 ///
-/// 1. Places: bright blobs of the left eye at several thresholds whose size fits the object; depth
-///    from the same blob in the right eye, else from the blob's area (the mean projected area of a
-///    convex body is a quarter of its surface, Cauchy 1832).
+/// 1. Places: stable bright regions of the left eye (findBrightRegions) whose size fits the object;
+///    depth from the same region in the right eye, else from the region's area.
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
 ///    of equivalent ones, at each place; scored by the blunt contour likelihood.
 /// 3. The best ones move in random steps that shrink, then are refined on sub-pixel edges.
@@ -45,37 +45,32 @@ class PoseSearch {
     float score = 0;
     std::size_t place = 0;
   };
-  struct Blob {
-    double u = 0, v = 0, area = 0;                    ///< centroid, area [px, px^2]
-    double left = 0, top = 0, width = 0, height = 0;  ///< box around it [px]
-    int threshold = 0;
-  };
   /// Where the object may be, and the box that it then fills in one eye.
   struct Place {
     Eigen::Vector3d point;  ///< [m]
     double doubt = 0;
-    Blob blob;
-    double eye_x = 0;  ///< [m] of the eye that sees the blob
+    BrightRegion region;
+    double eye_x = 0;  ///< [m] of the eye that sees the region
   };
 
-  std::vector<Blob> findBlobs(const cv::Mat& image) const;
   std::vector<Place> findPlaces(const RectifiedStereoFrame& frame) const;
   struct Glance {
-    Eigen::Array2f low = Eigen::Array2f::Constant(1e9F);    ///< least x / z, y / z
-    Eigen::Array2f high = Eigen::Array2f::Constant(-1e9F);  ///< largest ones
-    float length = 0;                                       ///< [px] of contour
+    BrightRegion::Extents extents;  ///< largest c x / z + s y / z, by direction
+    float length = 0;               ///< [px] of contour
   };
-  std::optional<Glance> glance(const ParticlePose& pose, double eye_x, int points) const;
-  std::optional<Pose> fitToBox(const Pose& pose, const Place& place) const;
-  void scoreAll(std::vector<Hypothesis>& hypotheses, int points,
-                const std::array<GainMap, 2>& maps) const;
+  std::optional<Glance> glance(const ParticlePose& pose, double eye_x, int points,
+                               bool extents) const;
+  float hullDoubt(const Glance& seen, const BrightRegion& region) const;
+  std::optional<Pose> fitToRegion(const Pose& pose, const Place& place) const;
+  void scoreAll(std::vector<Hypothesis>& hypotheses, int points, const std::array<GainMap, 2>& maps,
+                const std::vector<Place>& places) const;
   const std::array<GainMap, 2>& mapsFor(double depth, int sharpening = 0) const;
 
   TrackerParams params_;
   RectifiedStereoCamera camera_;
   const ContourModel* model_;
   PoseRefiner refiner_;
-  double surface_ = 0;                   ///< [m^2]
+  ShadowArea shadow_;                    ///< of the object from all sides
   std::vector<Eigen::Vector3d> pivots_;  ///< [m] of turned()
   Symmetry symmetry_;
   std::vector<Eigen::Matrix3d> turns_;
