@@ -127,12 +127,14 @@ void injection(benchmark::State& state) {
   });
 }
 
-/// Likelihoods that cost nothing: what is left is weights, resampling and spreading.
-void annealing(benchmark::State& state) {
+/// Likelihoods that cost nothing: what is left is weights, resampling and spreading, and the
+/// prediction that makes a thinned set whole again.
+void predictionAndAnnealing(benchmark::State& state) {
   Filtering filtering(state);
   const Pose truth = cube().camera_from_object.front();
   const float x = static_cast<float>(truth.translation().x());
   filtering.time(state, [&] {
+    filtering.filter().predict({}, 0.0087, Pose::Identity());
     filtering.filter().anneal(
         [x](const ParticlePose* poses, std::size_t count, float* scores) {
           for (std::size_t i = 0; i < count; ++i) {
@@ -159,7 +161,8 @@ void weighing(benchmark::State& state) {
 
 const bool registered = [] {
   for (const auto& [name, stage] :
-       {std::make_pair("prediction", prediction), std::make_pair("annealing", annealing),
+       {std::make_pair("prediction", prediction),
+        std::make_pair("predictionAndAnnealing", predictionAndAnnealing),
         std::make_pair("resampling", resampling), std::make_pair("injection", injection),
         std::make_pair("weighing", weighing)})
     benchmark::RegisterBenchmark(name, stage)
