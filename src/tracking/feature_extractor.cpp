@@ -118,19 +118,16 @@ std::vector<dlib::interest_point> surfPoints(const cv::Mat& image) {
   return points;
 }
 
-/// Between the darkest and the brightest twentieth [grey levels].
+/// Between the darkest and the brightest twentieth [grey levels], of every fourth pixel.
 int contrastOf(const cv::Mat& image) {
-  // Several counters side by side: neighbours are often equal.
-  std::array<std::array<int, 256>, 4> parts{};
-  for (int row = 0; row < image.rows; ++row) {
-    const unsigned char* values = image.ptr<unsigned char>(row);
-    for (int column = 0; column < image.cols; ++column)
-      ++parts[static_cast<std::size_t>(column) % parts.size()][values[column]];
-  }
   std::array<int, 256> counts{};
-  for (const auto& one : parts)
-    for (std::size_t value = 0; value < counts.size(); ++value) counts[value] += one[value];
-  const int part = image.rows * image.cols / 20;
+  int all = 0;
+  for (int row = 0; row < image.rows; row += 2) {
+    const unsigned char* values = image.ptr<unsigned char>(row);
+    for (int column = 0; column < image.cols; column += 2) ++counts[values[column]];
+    all += (image.cols + 1) / 2;
+  }
+  const int part = all / 20;
   int low = 0, high = 255;
   for (int sum = counts[0]; sum < part && low < 255; sum += counts[static_cast<std::size_t>(low)])
     ++low;

@@ -98,123 +98,197 @@ std::vector<double> hullDistances(const Mesh& mesh, const std::vector<Vector3f>&
   return distances;
 }
 
-/// Says whether a line of sight is free. A tree of boxes, split at the median.
+/// Says whether a line of sight is free. A tree of boxes, four children a node, split at medians:
+/// four boxes or four triangles are looked at together.
 class SightLines {
  public:
   explicit SightLines(const Mesh& mesh) {
-    std::vector<Vector3f> centers;
     for (const auto& t : mesh.triangles) {
       Triangle triangle;
       triangle.corner = mesh.vertices[t[0]].cast<float>();
       triangle.first = (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cast<float>();
       triangle.second = (mesh.vertices[t[2]] - mesh.vertices[t[0]]).cast<float>();
+      triangle.center = triangle.corner + (triangle.first + triangle.second) / 3;
       triangles_.push_back(triangle);
-      centers.push_back(triangle.corner + (triangle.first + triangle.second) / 3);
     }
-    std::vector<std::uint32_t> order(triangles_.size());
-    std::iota(order.begin(), order.end(), 0U);
-    nodes_.reserve(triangles_.size());
-    if (!order.empty()) build(centers, order, 0, order.size());
-    std::vector<Triangle> sorted;
-    for (const std::uint32_t i : order) sorted.push_back(triangles_[i]);
-    triangles_ = std::move(sorted);
+    order_.resize(triangles_.size());
+    std::iota(order_.begin(), order_.end(), 0U);
+    if (!order_.empty()) build({0, order_.size()});
+    triangles_ = {};
+    order_ = {};
   }
 
-  bool blocked(const Vector3f& from, const Vector3f& to) const {
+  /// @param last what blocked the line before, which is likely to block this one as well; any
+  /// number at first
+  bool blocked(const Vector3f& from, const Vector3f& to, std::uint32_t& last) const {
     if (nodes_.empty()) return false;
     const Vector3f way = to - from;
-    const Eigen::Array4f start(from.x(), from.y(), from.z(), 0);
-    const Eigen::Array4f inverse(1 / way.x(), 1 / way.y(), 1 / way.z(), 1);
-    std::array<std::uint32_t, 64> waiting;
+    if (last < leaves_.size() && hits(leaves_[last], from, way)) return true;
+    Vector3f inverse;
+    for (int axis = 0; axis < 3; ++axis)
+      inverse[axis] = way[axis] != 0 ? 1 / way[axis] : std::numeric_limits<float>::max();
+    std::array<std::uint32_t, 128> waiting;
     std::size_t count = 0;
     waiting[count++] = 0;
     while (count > 0) {
-      const std::uint32_t index = waiting[--count];
-      const Node& node = nodes_[index];
-      if (!crosses(node, start, inverse)) continue;
-      if (node.triangles > 0) {
-        for (std::uint32_t i = node.next; i < node.next + node.triangles; ++i)
-          if (hits(triangles_[i], from, way)) return true;
-      } else {
-        waiting[count++] = node.next;
-        waiting[count++] = index + 1;
+      const Node& node = nodes_[waiting[--count]];
+      const Lanes::Mask crossed = crosses(node, from, inverse);
+      for (std::size_t child = 0; child < 4; ++child) {
+        const std::uint32_t index = node.children[child];
+        if (index == 0 || !crossed[static_cast<Eigen::Index>(child)]) continue;
+        if (index < kLeaf) {
+          waiting[count++] = index;
+        } else if (hits(leaves_[index - kLeaf], from, way)) {
+          last = index - kLeaf;
+          return true;
+        }
       }
     }
     return false;
   }
 
  private:
-  struct Triangle {
-    Vector3f corner, first, second;
+  struct Lanes {
+    using Values = Eigen::Array4f;
+    using Mask = Eigen::Array<bool, 4, 1>;
   };
+  using Values = Lanes::Values;
+  /// Three coordinates of four things.
+  using Vectors = std::array<Values, 3>;
+  struct Triangle {
+    Vector3f corner, first, second, center;
+  };
+  struct Leaf {
+    Vectors corner, first, second;  ///< where there is no triangle: without extent
+  };
+  static constexpr std::uint32_t kLeaf = 1U << 31;
   struct Node {
-    Eigen::Array4f low, high;     ///< the fourth entry is any wide span, to fill a register
-    std::uint32_t next = 0;       ///< first triangle of a leaf, else the second child
-    std::uint32_t triangles = 0;  ///< zero: the first child is the node behind this one
+    Vectors low, high;
+    /// Nodes or, from kLeaf on, leaves; zero, which is nobody's child: none.
+    std::array<std::uint32_t, 4> children{};
+  };
+  struct Range {
+    std::size_t begin, end;
+    std::size_t size() const { return end - begin; }
   };
 
-  void build(const std::vector<Vector3f>& centers, std::vector<std::uint32_t>& order,
-             std::size_t begin, std::size_t end) {
-    const std::size_t index = nodes_.size();
-    nodes_.emplace_back();
-    Node node;
-    Eigen::Array3f low = Eigen::Array3f::Constant(std::numeric_limits<float>::max());
-    Eigen::Array3f high = -low, least = low, most = high;
-    for (std::size_t i = begin; i < end; ++i) {
-      const Triangle& t = triangles_[order[i]];
-      const Vector3f second = t.corner + t.first, third = t.corner + t.second;
-      for (const Vector3f& corner : {t.corner, second, third}) {
-        low = low.min(corner.array());
-        high = high.max(corner.array());
-      }
-      least = least.min(centers[order[i]].array());
-      most = most.max(centers[order[i]].array());
+  /// Two halves along the longest side of the centres' box.
+  std::array<Range, 2> split(const Range& range) {
+    Vector3f least = triangles_[order_[range.begin]].center, most = least;
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      least = least.cwiseMin(triangles_[order_[i]].center);
+      most = most.cwiseMax(triangles_[order_[i]].center);
     }
-    // Flat boxes would miss rays in their plane by rounding.
-    const float margin = 1e-6F * low.abs().max(high.abs()).maxCoeff();
-    node.low = {low.x() - margin, low.y() - margin, low.z() - margin, -1};
-    node.high = {high.x() + margin, high.y() + margin, high.z() + margin, 1};
-    if (end - begin <= 4) {
-      node.next = static_cast<std::uint32_t>(begin);
-      node.triangles = static_cast<std::uint32_t>(end - begin);
-    } else {
-      Eigen::Index axis = 0;
-      (most - least).maxCoeff(&axis);
-      const std::size_t middle = (begin + end) / 2;
-      const auto at = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
-      std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
-        return centers[a][axis] != centers[b][axis] ? centers[a][axis] < centers[b][axis] : a < b;
-      });
-      build(centers, order, begin, middle);
-      node.next = static_cast<std::uint32_t>(nodes_.size());
-      build(centers, order, middle, end);
-    }
-    nodes_[index] = node;
+    Eigen::Index axis = 0;
+    (most - least).maxCoeff(&axis);
+    const std::size_t middle = (range.begin + range.end) / 2;
+    const auto at = [&](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
+    std::nth_element(at(range.begin), at(middle), at(range.end),
+                     [&](std::uint32_t a, std::uint32_t b) {
+                       const float left = triangles_[a].center[axis];
+                       const float right = triangles_[b].center[axis];
+                       return left != right ? left < right : a < b;
+                     });
+    return {Range{range.begin, middle}, Range{middle, range.end}};
   }
 
-  static bool crosses(const Node& node, const Eigen::Array4f& from, const Eigen::Array4f& inverse) {
-    const Eigen::Array4f a = (node.low - from) * inverse;
-    const Eigen::Array4f b = (node.high - from) * inverse;
-    return std::max(a.min(b).maxCoeff(), 0.0F) <= std::min(a.max(b).minCoeff(), 1.0F);
+  /// @return index of the node
+  std::uint32_t build(const Range& range) {
+    const auto index = static_cast<std::uint32_t>(nodes_.size());
+    nodes_.emplace_back();
+    Node node;
+    node.low.fill(Values::Zero());
+    node.high.fill(Values::Zero());
+    std::vector<Range> parts{range};
+    if (range.size() > kMost) {
+      parts.clear();
+      for (const Range& half : split(range))
+        if (half.size() > kMost)
+          for (const Range& quarter : split(half)) parts.push_back(quarter);
+        else
+          parts.push_back(half);
+    }
+    for (std::size_t child = 0; child < parts.size(); ++child) {
+      setBox(parts[child], static_cast<Eigen::Index>(child), node);
+      node.children[child] =
+          parts[child].size() > kMost ? build(parts[child]) : kLeaf + addLeaf(parts[child]);
+    }
+    nodes_[index] = node;
+    return index;
+  }
+
+  void setBox(const Range& range, Eigen::Index child, Node& node) const {
+    Vector3f low = triangles_[order_[range.begin]].corner, high = low;
+    for (std::size_t i = range.begin; i < range.end; ++i) {
+      const Triangle& t = triangles_[order_[i]];
+      for (const Vector3f& corner :
+           {t.corner, Vector3f(t.corner + t.first), Vector3f(t.corner + t.second)}) {
+        low = low.cwiseMin(corner);
+        high = high.cwiseMax(corner);
+      }
+    }
+    // Flat boxes would miss rays in their plane by rounding.
+    const float margin = 1e-6F * low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      node.low[axis][child] = low[static_cast<Eigen::Index>(axis)] - margin;
+      node.high[axis][child] = high[static_cast<Eigen::Index>(axis)] + margin;
+    }
+  }
+
+  std::uint32_t addLeaf(const Range& range) {
+    Leaf leaf;
+    for (Vectors* vectors : {&leaf.corner, &leaf.first, &leaf.second})
+      vectors->fill(Values::Zero());
+    for (std::size_t i = range.begin; i < range.end; ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto lane = static_cast<Eigen::Index>(i - range.begin);
+        const auto k = static_cast<Eigen::Index>(axis);
+        leaf.corner[axis][lane] = triangles_[order_[i]].corner[k];
+        leaf.first[axis][lane] = triangles_[order_[i]].first[k];
+        leaf.second[axis][lane] = triangles_[order_[i]].second[k];
+      }
+    leaves_.push_back(leaf);
+    return static_cast<std::uint32_t>(leaves_.size() - 1);
+  }
+
+  static Lanes::Mask crosses(const Node& node, const Vector3f& from, const Vector3f& inverse) {
+    Values near = Values::Zero(), far = Values::Ones();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<Eigen::Index>(axis);
+      const Values a = (node.low[axis] - from[k]) * inverse[k];
+      const Values b = (node.high[axis] - from[k]) * inverse[k];
+      near = near.max(a.min(b));
+      far = far.min(a.max(b));
+    }
+    return near <= far;
   }
 
   /// Möller and Trumbore, Fast, minimum storage ray/triangle intersection, 1997.
-  static bool hits(const Triangle& t, const Vector3f& from, const Vector3f& way) {
-    const Vector3f p = way.cross(t.second);
-    const float determinant = t.first.dot(p);
-    if (determinant == 0) return false;
-    const Vector3f offset = from - t.corner;
-    const float u = offset.dot(p) / determinant;
-    if (!(u >= 0 && u <= 1)) return false;
-    const Vector3f q = offset.cross(t.first);
-    const float v = way.dot(q) / determinant;
-    if (!(v >= 0 && u + v <= 1)) return false;
-    const float along = t.second.dot(q) / determinant;
-    return along > 0 && along < 1;
+  static bool hits(const Leaf& leaf, const Vector3f& from, const Vector3f& way) {
+    const Vectors ray{Values::Constant(way.x()), Values::Constant(way.y()),
+                      Values::Constant(way.z())};
+    const Vectors p = cross(ray, leaf.second);
+    const Values determinant = dot(leaf.first, p);
+    const Vectors offset{from.x() - leaf.corner[0], from.y() - leaf.corner[1],
+                         from.z() - leaf.corner[2]};
+    const Values u = dot(offset, p) / determinant;
+    const Vectors q = cross(offset, leaf.first);
+    const Values v = dot(ray, q) / determinant;
+    const Values along = dot(leaf.second, q) / determinant;
+    return (determinant != 0 && u >= 0 && v >= 0 && u + v <= 1 && along > 0 && along < 1).any();
+  }
+  static Vectors cross(const Vectors& a, const Vectors& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  }
+  static Values dot(const Vectors& a, const Vectors& b) {
+    return a[0] * b[0] + (a[1] * b[1] + a[2] * b[2]);
   }
 
-  std::vector<Triangle> triangles_;
+  static constexpr std::size_t kMost = 4;  ///< triangles of a leaf
+  std::vector<Triangle> triangles_;        ///< while the tree is built
+  std::vector<std::uint32_t> order_;       ///< the same
   std::vector<Node> nodes_;
+  std::vector<Leaf> leaves_;
 };
 
 /// Each triangle once, whichever way round it is given.
@@ -255,10 +329,11 @@ class ContourFinder {
       faces_eye[t] = planes_[t].head<3>().dot(eye) + planes_[t].w() > 0 ? 1 : 0;
 
     std::vector<ContourSegment> segments;
+    std::uint32_t blocker = 0;
     for (std::size_t i = 0; i < sides_.size(); ++i) {
       const Sides& sides = sides_[i];
       const bool outline = (faces_eye[sides.first] ^ faces_eye[sides.second] ^ sides.flipped) != 0;
-      if (outline || sides.always) addVisible(edges_[i], outline, eye, segments);
+      if (outline || sides.always) addVisible(edges_[i], outline, eye, blocker, segments);
     }
     return segments;
   }
@@ -367,7 +442,7 @@ class ContourFinder {
   }
 
   /// Cuts an edge into pieces short enough to be wholly visible or wholly hidden.
-  void addVisible(const Edge& edge, bool outline, const Vector3d& eye,
+  void addVisible(const Edge& edge, bool outline, const Vector3d& eye, std::uint32_t& blocker,
                   std::vector<ContourSegment>& segments) const {
     const Vector3d along = edge.end - edge.start;
     const Vector3d to_eye = eye - (edge.start + edge.end) / 2;
@@ -382,7 +457,7 @@ class ContourFinder {
       const Vector3d ray = (eye - middle).normalized();
       const Vector3d free = freeSide(edge, outline, ray);
       const Vector3d from = middle + kOffSurface * radius_ * (free + ray);
-      if (sight_.blocked(from.cast<float>(), eye.cast<float>())) continue;
+      if (sight_.blocked(from.cast<float>(), eye.cast<float>(), blocker)) continue;
       if (outline && edge.kind == Kind::kSmooth) {
         addLimb(edge, start, end, ray, segments);
         continue;
