@@ -18,6 +18,7 @@
 #include <set>
 
 #include "contour_segments.hpp"
+#include "sight_lines.hpp"
 
 namespace leap_object_tracker {
 namespace {
@@ -98,199 +99,6 @@ std::vector<double> hullDistances(const Mesh& mesh, const std::vector<Vector3f>&
   return distances;
 }
 
-/// Says whether a line of sight is free. A tree of boxes, four children a node, split at medians:
-/// four boxes or four triangles are looked at together.
-class SightLines {
- public:
-  explicit SightLines(const Mesh& mesh) {
-    for (const auto& t : mesh.triangles) {
-      Triangle triangle;
-      triangle.corner = mesh.vertices[t[0]].cast<float>();
-      triangle.first = (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cast<float>();
-      triangle.second = (mesh.vertices[t[2]] - mesh.vertices[t[0]]).cast<float>();
-      triangle.center = triangle.corner + (triangle.first + triangle.second) / 3;
-      triangles_.push_back(triangle);
-    }
-    order_.resize(triangles_.size());
-    std::iota(order_.begin(), order_.end(), 0U);
-    if (!order_.empty()) build({0, order_.size()});
-    triangles_ = {};
-    order_ = {};
-  }
-
-  /// @param last what blocked the line before, which is likely to block this one as well; any
-  /// number at first
-  bool blocked(const Vector3f& from, const Vector3f& to, std::uint32_t& last) const {
-    if (nodes_.empty()) return false;
-    const Vector3f way = to - from;
-    if (last < leaves_.size() && hits(leaves_[last], from, way)) return true;
-    Vector3f inverse;
-    for (int axis = 0; axis < 3; ++axis)
-      inverse[axis] = way[axis] != 0 ? 1 / way[axis] : std::numeric_limits<float>::max();
-    std::array<std::uint32_t, 128> waiting;
-    std::size_t count = 0;
-    waiting[count++] = 0;
-    while (count > 0) {
-      const Node& node = nodes_[waiting[--count]];
-      const Lanes::Mask crossed = crosses(node, from, inverse);
-      for (std::size_t child = 0; child < 4; ++child) {
-        const std::uint32_t index = node.children[child];
-        if (index == 0 || !crossed[static_cast<Eigen::Index>(child)]) continue;
-        if (index < kLeaf) {
-          waiting[count++] = index;
-        } else if (hits(leaves_[index - kLeaf], from, way)) {
-          last = index - kLeaf;
-          return true;
-        }
-      }
-    }
-    return false;
-  }
-
- private:
-  struct Lanes {
-    using Values = Eigen::Array4f;
-    using Mask = Eigen::Array<bool, 4, 1>;
-  };
-  using Values = Lanes::Values;
-  /// Three coordinates of four things.
-  using Vectors = std::array<Values, 3>;
-  struct Triangle {
-    Vector3f corner, first, second, center;
-  };
-  struct Leaf {
-    Vectors corner, first, second;  ///< where there is no triangle: without extent
-  };
-  static constexpr std::uint32_t kLeaf = 1U << 31;
-  struct Node {
-    Vectors low, high;
-    /// Nodes or, from kLeaf on, leaves; zero, which is nobody's child: none.
-    std::array<std::uint32_t, 4> children{};
-  };
-  struct Range {
-    std::size_t begin, end;
-    std::size_t size() const { return end - begin; }
-  };
-
-  /// Two halves along the longest side of the centres' box.
-  std::array<Range, 2> split(const Range& range) {
-    Vector3f least = triangles_[order_[range.begin]].center, most = least;
-    for (std::size_t i = range.begin; i < range.end; ++i) {
-      least = least.cwiseMin(triangles_[order_[i]].center);
-      most = most.cwiseMax(triangles_[order_[i]].center);
-    }
-    Eigen::Index axis = 0;
-    (most - least).maxCoeff(&axis);
-    const std::size_t middle = (range.begin + range.end) / 2;
-    const auto at = [&](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(at(range.begin), at(middle), at(range.end),
-                     [&](std::uint32_t a, std::uint32_t b) {
-                       const float left = triangles_[a].center[axis];
-                       const float right = triangles_[b].center[axis];
-                       return left != right ? left < right : a < b;
-                     });
-    return {Range{range.begin, middle}, Range{middle, range.end}};
-  }
-
-  /// @return index of the node
-  std::uint32_t build(const Range& range) {
-    const auto index = static_cast<std::uint32_t>(nodes_.size());
-    nodes_.emplace_back();
-    Node node;
-    node.low.fill(Values::Zero());
-    node.high.fill(Values::Zero());
-    std::vector<Range> parts{range};
-    if (range.size() > kMost) {
-      parts.clear();
-      for (const Range& half : split(range))
-        if (half.size() > kMost)
-          for (const Range& quarter : split(half)) parts.push_back(quarter);
-        else
-          parts.push_back(half);
-    }
-    for (std::size_t child = 0; child < parts.size(); ++child) {
-      setBox(parts[child], static_cast<Eigen::Index>(child), node);
-      node.children[child] =
-          parts[child].size() > kMost ? build(parts[child]) : kLeaf + addLeaf(parts[child]);
-    }
-    nodes_[index] = node;
-    return index;
-  }
-
-  void setBox(const Range& range, Eigen::Index child, Node& node) const {
-    Vector3f low = triangles_[order_[range.begin]].corner, high = low;
-    for (std::size_t i = range.begin; i < range.end; ++i) {
-      const Triangle& t = triangles_[order_[i]];
-      for (const Vector3f& corner :
-           {t.corner, Vector3f(t.corner + t.first), Vector3f(t.corner + t.second)}) {
-        low = low.cwiseMin(corner);
-        high = high.cwiseMax(corner);
-      }
-    }
-    // Flat boxes would miss rays in their plane by rounding.
-    const float margin = 1e-6F * low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      node.low[axis][child] = low[static_cast<Eigen::Index>(axis)] - margin;
-      node.high[axis][child] = high[static_cast<Eigen::Index>(axis)] + margin;
-    }
-  }
-
-  std::uint32_t addLeaf(const Range& range) {
-    Leaf leaf;
-    for (Vectors* vectors : {&leaf.corner, &leaf.first, &leaf.second})
-      vectors->fill(Values::Zero());
-    for (std::size_t i = range.begin; i < range.end; ++i)
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto lane = static_cast<Eigen::Index>(i - range.begin);
-        const auto k = static_cast<Eigen::Index>(axis);
-        leaf.corner[axis][lane] = triangles_[order_[i]].corner[k];
-        leaf.first[axis][lane] = triangles_[order_[i]].first[k];
-        leaf.second[axis][lane] = triangles_[order_[i]].second[k];
-      }
-    leaves_.push_back(leaf);
-    return static_cast<std::uint32_t>(leaves_.size() - 1);
-  }
-
-  static Lanes::Mask crosses(const Node& node, const Vector3f& from, const Vector3f& inverse) {
-    Values near = Values::Zero(), far = Values::Ones();
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto k = static_cast<Eigen::Index>(axis);
-      const Values a = (node.low[axis] - from[k]) * inverse[k];
-      const Values b = (node.high[axis] - from[k]) * inverse[k];
-      near = near.max(a.min(b));
-      far = far.min(a.max(b));
-    }
-    return near <= far;
-  }
-
-  /// Möller and Trumbore, Fast, minimum storage ray/triangle intersection, 1997.
-  static bool hits(const Leaf& leaf, const Vector3f& from, const Vector3f& way) {
-    const Vectors ray{Values::Constant(way.x()), Values::Constant(way.y()),
-                      Values::Constant(way.z())};
-    const Vectors p = cross(ray, leaf.second);
-    const Values determinant = dot(leaf.first, p);
-    const Vectors offset{from.x() - leaf.corner[0], from.y() - leaf.corner[1],
-                         from.z() - leaf.corner[2]};
-    const Values u = dot(offset, p) / determinant;
-    const Vectors q = cross(offset, leaf.first);
-    const Values v = dot(ray, q) / determinant;
-    const Values along = dot(leaf.second, q) / determinant;
-    return (determinant != 0 && u >= 0 && v >= 0 && u + v <= 1 && along > 0 && along < 1).any();
-  }
-  static Vectors cross(const Vectors& a, const Vectors& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-  }
-  static Values dot(const Vectors& a, const Vectors& b) {
-    return a[0] * b[0] + (a[1] * b[1] + a[2] * b[2]);
-  }
-
-  static constexpr std::size_t kMost = 4;  ///< triangles of a leaf
-  std::vector<Triangle> triangles_;        ///< while the tree is built
-  std::vector<std::uint32_t> order_;       ///< the same
-  std::vector<Node> nodes_;
-  std::vector<Leaf> leaves_;
-};
-
 /// Each triangle once, whichever way round it is given.
 Mesh withoutRepeatedTriangles(const Mesh& mesh) {
   std::vector<std::size_t> order(mesh.triangles.size());
@@ -324,16 +132,17 @@ class ContourFinder {
   }
 
   std::vector<ContourSegment> segmentsFrom(const Vector3d& eye) const {
-    std::vector<std::uint8_t> faces_eye(planes_.size());
-    for (std::size_t t = 0; t < planes_.size(); ++t)
-      faces_eye[t] = planes_[t].head<3>().dot(eye) + planes_[t].w() > 0 ? 1 : 0;
-
     std::vector<ContourSegment> segments;
     std::uint32_t blocker = 0;
-    for (std::size_t i = 0; i < sides_.size(); ++i) {
-      const Sides& sides = sides_[i];
-      const bool outline = (faces_eye[sides.first] ^ faces_eye[sides.second] ^ sides.flipped) != 0;
-      if (outline || sides.always) addVisible(edges_[i], outline, eye, blocker, segments);
+    for (std::size_t patch = 0; patch < patches_.size(); ++patch) {
+      if (patches_[patch].looksOneWay(eye)) continue;
+      const std::size_t first = patch * kPatchEdges;
+      for (std::size_t i = first; i < std::min(first + kPatchEdges, sides_.size()); ++i) {
+        const Sides& sides = sides_[i];
+        const bool outline =
+            (facesEye(sides.first, eye) != facesEye(sides.second, eye)) != sides.flipped;
+        if (outline || sides.always) addVisible(edges_[i], outline, eye, blocker, segments);
+      }
     }
     return segments;
   }
@@ -353,13 +162,62 @@ class ContourFinder {
     bool opposed = false;  ///< the triangles are given in opposite turns
   };
 
-  /// What decides whether an edge is contour, apart from the rest: all edges are asked for every
+  /// What decides whether an edge is contour, apart from the rest: many edges are asked for every
   /// view. It is outline if one of the two triangles looks at the eye, or, if flipped, both or
   /// none.
   struct Sides {
     std::uint32_t first, second;
     bool flipped, always;
   };
+
+  static constexpr std::size_t kPatchEdges = 32;
+
+  /// Bounds of the planes at neighbouring edges: for most eyes all look at it, or none, and no edge
+  /// is outline.
+  struct Patch {
+    Vector3d center = Vector3d::Zero(), normal = Vector3d::Zero();
+    double spread = 0;               ///< of the normals about the mean one
+    double lowest = 0, highest = 0;  ///< [m] of the planes below the centre
+    double margin = 0;               ///< [m] of rounding
+    bool never_skipped = false;      ///< holds edges that do not depend on that
+
+    bool looksOneWay(const Vector3d& eye) const {
+      const Vector3d way = eye - center;
+      const double height = normal.dot(way), doubt = spread * way.norm() + margin;
+      return !never_skipped && (height - doubt + lowest > 0 || height + doubt + highest < 0);
+    }
+  };
+
+  bool facesEye(std::uint32_t triangle, const Vector3d& eye) const {
+    const Eigen::Vector4d& plane = planes_[triangle];
+    return plane.head<3>().dot(eye) + plane.w() > 0;
+  }
+
+  void findPatches() {
+    for (std::size_t first = 0; first < sides_.size(); first += kPatchEdges) {
+      const std::size_t end = std::min(first + kPatchEdges, sides_.size());
+      std::vector<std::uint32_t> triangles;
+      Patch patch;
+      for (std::size_t i = first; i < end; ++i) {
+        patch.never_skipped = patch.never_skipped || sides_[i].always || sides_[i].flipped;
+        patch.center +=
+            (edges_[i].start + edges_[i].end) / (2.0 * static_cast<double>(end - first));
+        triangles.insert(triangles.end(), {sides_[i].first, sides_[i].second});
+      }
+      for (const std::uint32_t t : triangles)
+        patch.normal += normals_[t] / static_cast<double>(triangles.size());
+      patch.lowest = std::numeric_limits<double>::max();
+      patch.highest = std::numeric_limits<double>::lowest();
+      for (const std::uint32_t t : triangles) {
+        const double below = normals_[t].dot(patch.center) + planes_[t].w();
+        patch.spread = std::max(patch.spread, (normals_[t] - patch.normal).norm());
+        patch.lowest = std::min(patch.lowest, below);
+        patch.highest = std::max(patch.highest, below);
+      }
+      patch.margin = 1e-9 * radius_;
+      patches_.push_back(patch);
+    }
+  }
 
   bool forwards(std::size_t triangle, std::uint32_t start, std::uint32_t end) const {
     const auto& t = mesh_.triangles[triangle];
@@ -439,6 +297,7 @@ class ContourFinder {
                         edge.kind == Kind::kOpen || (edge.opposed && !branching),
                         edge.kind != Kind::kSmooth});
     }
+    findPatches();
   }
 
   /// Cuts an edge into pieces short enough to be wholly visible or wholly hidden.
@@ -525,7 +384,8 @@ class ContourFinder {
   std::vector<Vector3d> normals_;
   std::vector<Eigen::Vector4d> planes_;
   std::vector<Edge> edges_;
-  std::vector<Sides> sides_;  ///< of each edge
+  std::vector<Sides> sides_;    ///< of each edge
+  std::vector<Patch> patches_;  ///< of kPatchEdges neighbouring edges each
 };
 
 MeshViews computeViews(const Mesh& mesh, int points) {
@@ -619,7 +479,7 @@ class ViewFile {
   }
 
  private:
-  static constexpr std::uint64_t kVersion = 4;  ///< of the format and of how views are found
+  static constexpr std::uint64_t kVersion = 5;  ///< of the format and of how views are found
   static_assert(sizeof(ContourPoint) == 17 * sizeof(float), "written as bytes, without gaps");
 
   template <class T>
