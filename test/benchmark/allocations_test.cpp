@@ -7,6 +7,8 @@
 #include <cstddef>
 
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
+#include "leap_object_tracker/tracking/edge_field.hpp"
+#include "leap_object_tracker/tracking/feature_measurement.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/tracker.hpp"
 #include "recording.hpp"
@@ -112,24 +114,67 @@ TEST(Allocations, doNotHappenInTheParticleFilter) {
   });
 }
 
-TEST(Allocations, ofAWholeFrameAreFewAndDoNotGrow) {
+TEST(Allocations, ofTheEdgesOfAnEyeAreThoseOfCanny) {
+  const Observation seen(frames());
+  EdgeField field;
+  GainMap map;
+  tbb::task_arena arena(1);
+  arena.execute([&] {
+    EXPECT_LE(allocationsOf([&](int) {
+                field.build(frames().rectified[0].left, seen.regions()[0]);
+              }),
+              1);
+    EXPECT_EQ(allocationsOf([&](int) { field.transform({1.2F, 3.0F}, 1, map); }), 0);
+  });
+}
+
+const Recording& cylinder() { return recording("x10_cylinder_textured", "640x240", 10); }
+
+TEST(Allocations, ofFeaturesAreFew) {
+  const Observation seen(cylinder());
+  const Pose& pose = cylinder().camera_from_object[0];
+  FeatureMeasurement measurement(FeatureParams(), cylinder().object, cylinder().camera);
+  const auto poses = seen.particles(1000);
+  std::vector<float> scores(poses.size());
+  tbb::task_arena arena(1);
+  arena.execute([&] {
+    EXPECT_LE(allocationsOf([&](int) {
+                measurement.observe(cylinder().rectified[0], seen.regions(), pose, 0.0005);
+              }),
+              1);
+    EXPECT_EQ(allocationsOf([&](int) {
+                measurement.score(poses.data(), poses.size(), scores.data());
+                measurement.refine({pose, 1e6 * Matrix6d::Identity()});
+              }),
+              0);
+    EXPECT_LE(allocationsOf([&](int) { measurement.learn(pose, 0.0002, 0.002); }), 1);
+  });
+}
+
+/// Of a tracked frame, after frames enough to settle.
+double allocationsOfAFrame(const Recording& recording, Measurement measurement) {
   TrackerParams params;
-  params.measurement = Measurement::kContour;
+  params.measurement = measurement;
   params.threads = 1;
-  Tracker tracker(params, frames().object, frames().camera);
-  tracker.start(frames().camera_from_object[0]);
-  const Stamp::duration period = frames().raw[1].stamp - frames().raw[0].stamp;
-  RectifiedStereoFrame frame = frames().rectified[0];
+  Tracker tracker(params, recording.object, recording.camera);
+  tracker.start(recording.camera_from_object[0]);
+  const Stamp::duration period = recording.raw[1].stamp - recording.raw[0].stamp;
+  RectifiedStereoFrame frame = recording.rectified[0];
   const auto track = [&](int) {
     frame.stamp += period;
     ASSERT_TRUE(tracker.track(frame));
   };
   const double first = allocationsOf(track), later = allocationsOf(track);
-  RecordProperty("allocations a frame", std::to_string(later));
-  std::printf("allocations a frame: %.1f\n", later);
   EXPECT_LE(later, first + 1);
-  // OpenCV's filters and Canny's queues keep no memory between calls, nor does the refinement.
-  EXPECT_LT(later, 300);
+  return later;
+}
+
+TEST(Allocations, ofAWholeFrameAreFewAndDoNotGrow) {
+  const double contour = allocationsOfAFrame(frames(), Measurement::kContour);
+  const double features = allocationsOfAFrame(cylinder(), Measurement::kBoth);
+  std::printf("allocations a frame: %.1f, with features %.1f\n", contour, features);
+  EXPECT_LT(contour, 300);
+  EXPECT_LT(features, 300);
 }
 
 }  // namespace
