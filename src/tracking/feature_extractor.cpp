@@ -353,12 +353,9 @@ void FeatureExtractor::match(const FeatureWindow& window, double zoom) {
   };
   const double fb = camera_.focal_length * camera_.baseline;
   const double least = fb / window.farthest, most = fb / window.nearest;
-  constexpr float kFar = std::numeric_limits<float>::infinity();
-  struct Best {
-    float distance = kFar, second = kFar;
-    int index = -1;
-  };
-  std::vector<Best> of_left(left.corners.size()), of_right(right.corners.size());
+  auto& [of_left, of_right] = nearest_;
+  of_left.assign(left.corners.size(), Best());
+  of_right.assign(right.corners.size(), Best());
   const auto offer = [](Best& best, float distance, std::size_t index) {
     if (distance < best.distance) {
       best.second = best.distance;

@@ -49,7 +49,7 @@ void FeatureMeasurement::observe(const RectifiedStereoFrame& frame,
 }
 
 void FeatureMeasurement::expect(const Pose& predicted, double uncertainty) {
-  matches_ = landmarks_.match(features_, predicted, std::max(kLeastReach, 3 * uncertainty));
+  landmarks_.match(features_, predicted, std::max(kLeastReach, 3 * uncertainty), matches_);
   makePoints();
 }
 
@@ -170,20 +170,20 @@ PosePrior FeatureMeasurement::refine(const PosePrior& prior,
 void FeatureMeasurement::learn(const Pose& camera_from_object, double position_sigma,
                                double rotation_sigma) {
   const Pose object_from_camera = camera_from_object.inverse();
-  std::vector<bool> on_surface(features_.size(), false);
+  on_surface_.assign(features_.size(), false);
   for (std::size_t i = 0; i < features_.size(); ++i) {
     const Point& point = points_[i];
     const Eigen::Vector3f spot = (object_from_camera * features_[i].point_in_camera).cast<float>();
     const float distance = distance_(spot);
-    on_surface[i] = distance * distance < 9 * point.variance;
+    on_surface_[i] = distance * distance < 9 * point.variance;
     if (!point.has_landmark) continue;
     const Eigen::Vector3d apart =
         features_[i].point_in_camera - camera_from_object * point.landmark.cast<double>();
     if (sigmoid(point.peak - 0.5 * apart.dot(point.information.cast<double>() * apart)) < kTrusted)
-      on_surface[i] = false;
+      on_surface_[i] = false;
   }
   const double turn = radius_ * rotation_sigma;
-  landmarks_.learn(features_, matches_, on_surface, camera_from_object,
+  landmarks_.learn(features_, matches_, on_surface_, camera_from_object,
                    position_sigma * position_sigma + turn * turn);
 }
 

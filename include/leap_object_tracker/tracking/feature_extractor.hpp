@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/core/types.hpp>
 #include <vector>
@@ -77,6 +78,12 @@ class FeatureExtractor {
     std::vector<Corner> corners;
   };
 
+  /// The likest corners of the other eye.
+  struct Best {
+    float distance = std::numeric_limits<float>::infinity(), second = distance;  ///< squared
+    int index = -1;
+  };
+
   void prepare(const cv::Mat& image, const cv::Rect& region, double zoom, double roll,
                EyeImage& eye) const;
   void findFast(EyeImage& eye) const;
@@ -86,6 +93,7 @@ class FeatureExtractor {
   RectifiedStereoCamera camera_;
   CornerDetector detector_;
   std::array<EyeImage, 2> eyes_;
+  std::array<std::vector<Best>, 2> nearest_;  ///< of the corners of each eye
   std::vector<StereoFeature> features_;
   Counts counts_;
 };

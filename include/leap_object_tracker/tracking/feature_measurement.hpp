@@ -92,6 +92,7 @@ class FeatureMeasurement {
   LandmarkMap landmarks_;
   std::vector<StereoFeature> features_;
   std::vector<int> matches_;
+  std::vector<bool> on_surface_;
   std::vector<Point> points_;
   FeatureArrays arrays_;  ///< the same for the scoring of many poses
 };
