@@ -32,11 +32,13 @@ constexpr double kSurfThreshold = 30;  // of dlib's determinant of the Hessian, 
 class SurfSampling {
  public:
   /// @param roll [rad]
-  /// @param row [bytes] of the images
-  SurfSampling(double roll, std::size_t row)
-      : row_(static_cast<std::ptrdiff_t>(row)),
+  /// @param memory is used as long as this lives
+  SurfSampling(const cv::Mat& image, double roll, std::vector<WaveletResponse>& memory)
+      : row_(image.cols),
+        responses_(memory),
         cosine_(static_cast<float>(std::cos(roll))),
         sine_(static_cast<float>(std::sin(roll))) {
+    respond(image);
     const double c = std::cos(roll), s = std::sin(roll);
     for (std::size_t i = 0; i < offsets_.size(); ++i) {
       constexpr double kHalf = kSide / 2;
@@ -48,20 +50,20 @@ class SurfSampling {
     }
   }
 
-  FeatureDescriptor operator()(const cv::Mat& image, const cv::Point& place) const {
-    const unsigned char* centre = image.ptr<unsigned char>(place.y) + place.x;
+  FeatureDescriptor operator()(const cv::Point& place) const {
+    const WaveletResponse* centre = responses_.data() + place.y * row_ + place.x;
     std::array<Sums, kStride * kStride> samples{};  // with a border of zeros
-    for (std::size_t y = 0; y < kSide; ++y)
+    for (std::size_t y = 0; y < kSide; ++y) {
+      std::array<WaveletResponse, kSide> here;
+      for (std::size_t x = 0; x < kSide; ++x) here[x] = centre[offsets_[y * kSide + x]];
+      Sums* to = samples.data() + (y + 1) * kStride + 1;
       for (std::size_t x = 0; x < kSide; ++x) {
-        const unsigned char *here = centre + offsets_[y * kSide + x], *above = here - row_;
-        const int falling = here[0] - above[-1], rising = above[0] - here[-1];
-        const auto along_u = static_cast<float>(falling + rising);
-        const auto along_v = static_cast<float>(falling - rising);
+        const auto along_u = static_cast<float>(here[x].u), along_v = static_cast<float>(here[x].v);
         const float along_x = cosine_ * along_u + sine_ * along_v;
         const float along_y = cosine_ * along_v - sine_ * along_u;
-        samples[(y + 1) * kStride + x + 1] = {along_x, along_y, std::abs(along_x),
-                                              std::abs(along_y)};
+        to[x] = {along_x, along_y, std::abs(along_x), std::abs(along_y)};
       }
+    }
     FeatureDescriptor descriptor;
     auto out = descriptor.begin();
     for (std::size_t y = 0; y < kSide; y += kCell)
@@ -77,6 +79,19 @@ class SurfSampling {
   }
 
  private:
+  void respond(const cv::Mat& image) {
+    responses_.resize(image.total());
+    for (int y = 1; y < image.rows; ++y) {
+      const auto *above = image.ptr<unsigned char>(y - 1), *here = image.ptr<unsigned char>(y);
+      WaveletResponse* to = responses_.data() + y * row_;
+      for (int x = 1; x < image.cols; ++x) {
+        const int falling = here[x] - above[x - 1], rising = above[x] - here[x - 1];
+        to[x] = {static_cast<std::int16_t>(falling + rising),
+                 static_cast<std::int16_t>(falling - rising)};
+      }
+    }
+  }
+
   static constexpr std::size_t kSide = 20, kCell = 5, kReach = kCell + 2;  // samples
   static constexpr std::size_t kStride = kSide + 2;
   using Sums = std::array<float, 4>;  ///< of x, y, |x|, |y|
@@ -100,6 +115,8 @@ class SurfSampling {
   }
 
   std::ptrdiff_t row_;
+  std::vector<WaveletResponse>&
+      responses_;  ///< of each pixel but those of the first row and column
   float cosine_, sine_;
   std::array<std::ptrdiff_t, kSide * kSide> offsets_;
 };
@@ -310,8 +327,8 @@ void FeatureExtractor::prepare(const cv::Mat& image, const cv::Rect& region, dou
         eye.corners.push_back({place, static_cast<float>(point.score), {}});
     }
   }
-  const SurfSampling describe(roll, eye.scaled.step);
-  for (Corner& corner : eye.corners) corner.descriptor = describe(eye.scaled, corner.place);
+  const SurfSampling describe(eye.scaled, roll, eye.responses);
+  for (Corner& corner : eye.corners) corner.descriptor = describe(corner.place);
 }
 
 void FeatureExtractor::findFast(EyeImage& eye) const {

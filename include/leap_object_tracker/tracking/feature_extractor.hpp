@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/core/types.hpp>
@@ -17,6 +18,11 @@ namespace leap_object_tracker {
 using FeatureDescriptor = std::array<float, 64>;
 
 float squaredDistance(const FeatureDescriptor& a, const FeatureDescriptor& b);
+
+/// Of Haar wavelets along the columns and rows of an image, at one pixel [grey levels].
+struct WaveletResponse {
+  std::int16_t u = 0, v = 0;
+};
 
 /// A corner that both eyes see.
 struct StereoFeature {
@@ -76,6 +82,7 @@ class FeatureExtractor {
     cv::Mat taken;       ///< not zero where a corner is close by
     std::vector<cv::KeyPoint> found;
     std::vector<Corner> corners;
+    std::vector<WaveletResponse> responses;
   };
 
   /// The likest corners of the other eye.
