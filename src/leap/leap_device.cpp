@@ -254,6 +254,7 @@ void LeapDevice::receive(ByteView payload, Arrival arrival) {
   waiting.begin = frame->has_device_ms
                       ? clock_->push(frame->device_ms, onSteadyClock(frame->arrival))
                       : onSteadyClock(frame->arrival);
+  waiting.end = onSteadyClock(arrival);
   waiting.frame = std::move(*frame);
   waiting_.push_back(std::move(waiting));
   if (waiting_.size() > static_cast<std::size_t>(std::max(1, params_.queue))) {
@@ -334,6 +335,7 @@ LeapFrame LeapDevice::finished(WaitingFrame&& waiting) {
   // The exposure ends when read-out begins.
   const double middle = waiting.begin - first_payload_time_ -
                         frame.taken_with.exposure_us * 1e-6 / 2 + params_.stamp_offset;
+  frame.transport = waiting.end - middle;
   const auto since_now = std::chrono::duration_cast<std::chrono::nanoseconds>(
       std::chrono::duration<double>(middle - onSteadyClock(Arrival::clock::now())));
   const Stamp now =

@@ -93,6 +93,7 @@ LeapFrameInfo messageFrom(const LeapFrame& frame, bool lit, bool ambient_subtrac
   message.label1 = static_cast<std::uint8_t>(frame.metadata.label1);
   message.label2 = static_cast<std::uint8_t>(frame.metadata.label2);
   message.device_time = frame.device_ms;
+  message.transport = frame.transport;
   return message;
 }
 

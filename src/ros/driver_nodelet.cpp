@@ -172,17 +172,17 @@ class DriverNodelet : public nodelet::Nodelet {
         dark_detector_.isDark(frame.metadata, config.dark_interval >= 2 ? brightnessOf(frame) : 0,
                               frame.taken_with.dark_interval);
     const bool alternates = config.dark_interval >= 2;
-    if (config.auto_exposure && !(alternates && dark)) adjustExposure(frame);
-
-    bool subtracted = false;
-    if (config.subtract_ambient && alternates) {
-      if (dark) {
-        ambient_.setDark(frame.images.left, frame.images.right, frame.taken_with);
-        return;
-      }
-      subtracted = ambient_.subtract(frame.images.left, frame.images.right, frame.taken_with);
+    const bool judged = config.auto_exposure && !(alternates && dark);
+    const bool subtracts = config.subtract_ambient && alternates;
+    if (subtracts && dark) {
+      ambient_.setDark(frame.images.left, frame.images.right, frame.taken_with);
+      return;
     }
-    send(frame, !dark, subtracted);
+    if (judged && subtracts) adjustExposure(frame);
+    send(frame, !dark,
+         subtracts && ambient_.subtract(frame.images.left, frame.images.right, frame.taken_with));
+    // Of pictures as they came, while others are at work on them.
+    if (judged && !subtracts) adjustExposure(frame);
   }
 
   void send(const LeapFrame& frame, bool lit, bool subtracted) {

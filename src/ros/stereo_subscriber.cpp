@@ -8,6 +8,7 @@ namespace leap_object_tracker {
 namespace {
 
 constexpr double kWatchPeriod = 5.0;  // [s]
+constexpr double kRest = 0.0005;      // [s] in which messages that wait would have come
 /// Messages that one topic keeps while a pair is at work: enough for the others to catch up.
 constexpr std::uint32_t kQueue = 16;
 
@@ -101,7 +102,12 @@ void StereoSubscriber::take(Topic topic, const ros::Time& stamp, const StereoMes
   if (!pair) return;
   ++pairs_;
   queue_.push(*pair);
-  askToHandOn();
+  // Whoever was at rest until now has no other messages waiting; else they are looked at first.
+  const bool rested = ros::WallTime::now() - finished_ > ros::WallDuration(kRest);
+  if (rested && !waits_to_hand_on_)
+    handOn();
+  else
+    askToHandOn();
 }
 
 void StereoSubscriber::askToHandOn() {
@@ -114,6 +120,7 @@ void StereoSubscriber::askToHandOn() {
 void StereoSubscriber::handOn() {
   waits_to_hand_on_ = false;
   if (const auto pair = queue_.next()) callback_(*pair);
+  finished_ = ros::WallTime::now();
   // Behind the messages that came meanwhile.
   if (!queue_.empty()) askToHandOn();
 }

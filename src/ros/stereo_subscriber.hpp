@@ -64,6 +64,7 @@ class StereoSubscriber {
   StereoMatcher matcher_;
   PairQueue queue_;
   bool waits_to_hand_on_ = false;
+  ros::WallTime finished_;  ///< when the last pair was done with
 
   ros::WallTimer watch_timer_;
   std::array<int, kTopics> received_{};

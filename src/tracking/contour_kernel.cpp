@@ -17,7 +17,7 @@ namespace leap_object_tracker {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr std::size_t kBlock = 128;  // points at a time: what is kept of them fits the L1 cache
+constexpr std::size_t kBlock = 256;  // points at a time: what is kept of them fits the L1 cache
 constexpr float kRounder = 0x1p23F;  // a float this large has no fraction: adding it rounds
 
 /// What stays the same for all poses of a batch.
@@ -54,7 +54,7 @@ Eye prepared(const EyeView& view, float independent_share) {
           map.nats_per_step / map.cells_per_pixel * independent_share};
 }
 
-/// What the contour points of a block look up in one eye, and what it counts.
+/// What contour points look up in one eye, and what it counts.
 struct Lookups {
   HWY_ALIGN std::uint32_t offsets[kBlock];  ///< [bytes] from cell (0, 0) of plane 0
   HWY_ALIGN float weights[kBlock];          ///< [cells] projected length
@@ -103,26 +103,29 @@ HWY_INLINE void lookUp(const Eye& eye, std::size_t count, Lookups& lookups) {
 
 /// Adds length times gain [cells, grey steps].
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE V sumUp(D df, const Lookups& lookups, std::size_t count) {
+HWY_INLINE V sumUp(D df, const Lookups& lookups, std::size_t begin, std::size_t count) {
   const hn::RebindToSigned<D> di;
   const hn::Rebind<std::uint8_t, D> bytes;
   const auto none = hn::Set(df, static_cast<float>(GainMap::kZero));
   auto sum = hn::Zero(df);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
+  for (std::size_t i = begin; i < begin + count; i += hn::Lanes(df)) {
     const auto gain = hn::ConvertTo(df, hn::PromoteTo(di, hn::Load(bytes, lookups.gains + i)));
     sum = hn::MulAdd(hn::Load(df, lookups.weights + i), hn::Sub(gain, none), sum);
   }
   return sum;
 }
 
-/// Log-likelihood of one view in one eye or, if both see the same view by the same focal length in
-/// cells, in two: depths and rows of the contour are then the same, and its columns differ by the
-/// baseline over the depth.
+/// Lays down what one view looks up in one eye or, if both see the same view by the same focal
+/// length in cells, in two: depths and rows of the contour are then the same, and its columns
+/// differ by the baseline over the depth.
+/// @param count a multiple of 16
 /// @param r, t rotation, row by row, and translation of camera_from_object
+/// @param place of the first point in the lookups
 template <bool kStereo>
-float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, std::size_t scored,
-                const std::array<float, 9>& r, const std::array<float, 3>& t, const Eye& first,
-                const Eye& second) {
+void layDown(const float* HWY_RESTRICT arrays, std::size_t points, std::size_t count,
+             const std::array<float, 9>& r, const std::array<float, 3>& t, const Eye& first,
+             const Eye& second, std::size_t place, Lookups& first_lookups,
+             Lookups& second_lookups) {
   const hn::ScalableTag<float> df;
   // Rows of the projection to cells: u = (row_u * point) / (row_z * point).
   const auto row = [&](std::size_t k, std::size_t from, float focal, float center)
@@ -140,52 +143,89 @@ float scoreView(const float* HWY_RESTRICT arrays, std::size_t points, std::size_
   const auto shift_v = hn::Set(df, second.center_v - center_v);
   const auto nearest = hn::Set(df, 0.01F), two = hn::Set(df, 2.0F), rounder = hn::Set(df, kRounder);
 
-  auto total = hn::Zero(df);
-  Lookups first_lookups, second_lookups;
-  for (std::size_t begin = 0; begin < scored; begin += kBlock) {
-    const std::size_t count = std::min(kBlock, scored - begin);
-    for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
-      const float* at = arrays + begin + i;
-      const auto x = hn::LoadU(df, at), y = hn::LoadU(df, at + points);
-      const auto z = hn::LoadU(df, at + 2 * points);
-      const auto depth = hn::MulAdd(z0, x, hn::MulAdd(z1, y, hn::MulAdd(z2, z, z3)));
-      const auto bounded = hn::Max(depth, nearest);
-      const auto guess = hn::ApproximateReciprocal(bounded);
-      const auto inverse = hn::Mul(guess, hn::NegMulAdd(bounded, guess, two));  // Newton's step
-      const auto weight = hn::IfThenElseZero(hn::Gt(depth, nearest), inverse);
-      const auto u = hn::Mul(hn::MulAdd(u0, x, hn::MulAdd(u1, y, hn::MulAdd(u2, z, u3))), inverse);
-      const auto v = hn::Mul(hn::MulAdd(v0, x, hn::MulAdd(v1, y, hn::MulAdd(v2, z, v3))), inverse);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(df)) {
+    const float* at = arrays + i;
+    const auto x = hn::LoadU(df, at), y = hn::LoadU(df, at + points);
+    const auto z = hn::LoadU(df, at + 2 * points);
+    const auto depth = hn::MulAdd(z0, x, hn::MulAdd(z1, y, hn::MulAdd(z2, z, z3)));
+    const auto bounded = hn::Max(depth, nearest);
+    const auto guess = hn::ApproximateReciprocal(bounded);
+    const auto inverse = hn::Mul(guess, hn::NegMulAdd(bounded, guess, two));  // Newton's step
+    const auto weight = hn::IfThenElseZero(hn::Gt(depth, nearest), inverse);
+    const auto u = hn::Mul(hn::MulAdd(u0, x, hn::MulAdd(u1, y, hn::MulAdd(u2, z, u3))), inverse);
+    const auto v = hn::Mul(hn::MulAdd(v0, x, hn::MulAdd(v1, y, hn::MulAdd(v2, z, v3))), inverse);
 
-      // Tangent times length, projected: d(U/Z) = (dU - U/Z dZ) / Z.
-      const auto a = hn::LoadU(df, at + 3 * points), b = hn::LoadU(df, at + 4 * points);
-      const auto c = hn::LoadU(df, at + 5 * points);
-      const auto along_u = hn::MulAdd(u0, a, hn::MulAdd(u1, b, hn::Mul(u2, c)));
-      const auto along_v = hn::MulAdd(v0, a, hn::MulAdd(v1, b, hn::Mul(v2, c)));
-      const auto along_z = hn::MulAdd(z0, a, hn::MulAdd(z1, b, hn::Mul(z2, c)));
-      const auto dv = hn::NegMulAdd(v, along_z, along_v), size_v = hn::Abs(dv);
-      const auto limit_1 = hn::Mul(size_v, hn::Set(df, 1 / 0.19891237F));
-      const auto limit_2 = hn::Mul(size_v, hn::Set(df, 1 / 0.66817864F));
-      const auto limit_3 = hn::Mul(size_v, hn::Set(df, 1 / 1.49660576F));
-      const auto limit_4 = hn::Mul(size_v, hn::Set(df, 1 / 5.02733949F));
+    // Tangent times length, projected: d(U/Z) = (dU - U/Z dZ) / Z.
+    const auto a = hn::LoadU(df, at + 3 * points), b = hn::LoadU(df, at + 4 * points);
+    const auto c = hn::LoadU(df, at + 5 * points);
+    const auto along_u = hn::MulAdd(u0, a, hn::MulAdd(u1, b, hn::Mul(u2, c)));
+    const auto along_v = hn::MulAdd(v0, a, hn::MulAdd(v1, b, hn::Mul(v2, c)));
+    const auto along_z = hn::MulAdd(z0, a, hn::MulAdd(z1, b, hn::Mul(z2, c)));
+    const auto dv = hn::NegMulAdd(v, along_z, along_v), size_v = hn::Abs(dv);
+    const auto limit_1 = hn::Mul(size_v, hn::Set(df, 1 / 0.19891237F));
+    const auto limit_2 = hn::Mul(size_v, hn::Set(df, 1 / 0.66817864F));
+    const auto limit_3 = hn::Mul(size_v, hn::Set(df, 1 / 1.49660576F));
+    const auto limit_4 = hn::Mul(size_v, hn::Set(df, 1 / 5.02733949F));
 
-      addLookups(df, first, hn::Add(u, rounder), hn::Add(v, rounder),
-                 hn::NegMulAdd(u, along_z, along_u), dv, limit_1, limit_2, limit_3, limit_4, weight,
-                 first_lookups, i);
-      if (!kStereo) continue;
-      const auto moved = hn::MulAdd(disparity, inverse, u);
-      addLookups(df, second, hn::Add(hn::Add(moved, shift_u), rounder),
-                 hn::Add(hn::Add(v, shift_v), rounder), hn::NegMulAdd(moved, along_z, along_u), dv,
-                 limit_1, limit_2, limit_3, limit_4, weight, second_lookups, i);
-    }
-    // All loads before the first sum: bytes just written are slow to be read as one vector.
-    lookUp(first, count, first_lookups);
-    if (kStereo) lookUp(second, count, second_lookups);
-    total = hn::MulAdd(hn::Set(df, first.scale), sumUp(df, first_lookups, count), total);
-    if (kStereo)
-      total = hn::MulAdd(hn::Set(df, second.scale), sumUp(df, second_lookups, count), total);
+    addLookups(df, first, hn::Add(u, rounder), hn::Add(v, rounder),
+               hn::NegMulAdd(u, along_z, along_u), dv, limit_1, limit_2, limit_3, limit_4, weight,
+               first_lookups, place + i);
+    if (!kStereo) continue;
+    const auto moved = hn::MulAdd(disparity, inverse, u);
+    addLookups(df, second, hn::Add(hn::Add(moved, shift_u), rounder),
+               hn::Add(hn::Add(v, shift_v), rounder), hn::NegMulAdd(moved, along_z, along_u), dv,
+               limit_1, limit_2, limit_3, limit_4, weight, second_lookups, place + i);
   }
-  return hn::GetLane(hn::SumOfLanes(df, total));
 }
+
+/// Several poses at a time, in one eye or two: all points are laid down before the first is looked
+/// up, and all looked up before the first sum, since numbers just written are slow to be read in
+/// another width.
+template <bool kStereo>
+class Batch {
+ public:
+  Batch(const Eye& first, const Eye& second, float* log_likelihood)
+      : first_(first), second_(second), log_likelihood_(log_likelihood) {}
+
+  void add(std::size_t pose, const float* arrays, std::size_t points, std::size_t scored,
+           const std::array<float, 9>& r, const std::array<float, 3>& t) {
+    for (std::size_t begin = 0; begin < scored; begin += kBlock) {
+      const std::size_t count = std::min(kBlock, scored - begin);
+      if (used_ + count > kBlock) finish();
+      layDown<kStereo>(arrays + begin, points, count, r, t, first_, second_, used_, first_lookups_,
+                       second_lookups_);
+      parts_[part_count_++] = {pose, used_, count};
+      used_ += count;
+    }
+  }
+
+  void finish() {
+    const hn::ScalableTag<float> df;
+    lookUp(first_, used_, first_lookups_);
+    if (kStereo) lookUp(second_, used_, second_lookups_);
+    for (std::size_t i = 0; i < part_count_; ++i) {
+      const Part& part = parts_[i];
+      auto sum =
+          hn::Mul(hn::Set(df, first_.scale), sumUp(df, first_lookups_, part.begin, part.count));
+      if (kStereo)
+        sum = hn::MulAdd(hn::Set(df, second_.scale),
+                         sumUp(df, second_lookups_, part.begin, part.count), sum);
+      log_likelihood_[part.pose] += hn::GetLane(hn::SumOfLanes(df, sum));
+    }
+    used_ = part_count_ = 0;
+  }
+
+ private:
+  struct Part {
+    std::size_t pose, begin, count;
+  };
+
+  const Eye first_, second_;
+  float* const log_likelihood_;
+  std::size_t used_ = 0, part_count_ = 0;
+  std::array<Part, kBlock / 16> parts_;
+  Lookups first_lookups_, second_lookups_;
+};
 
 /// The pose turned about the object's z axis, as the choice wants it.
 std::array<float, 9> turned(const std::array<float, 9>& r, const ViewChoice& choice) {
@@ -206,7 +246,14 @@ void scorePoses(const ContourModel& model, std::size_t points, const EyeView* vi
   for (std::size_t i = 0; i < std::min<std::size_t>(view_count, eyes.size()); ++i)
     if (views[i].map != nullptr) eyes[eye_count++] = prepared(views[i], independent_share);
   const auto entries = static_cast<std::size_t>(model.points());
+  Batch<true> both(eyes[0], eyes[1], log_likelihood);
+  std::array<Batch<false>, 2> single{Batch<false>(eyes[0], eyes[0], log_likelihood),
+                                     Batch<false>(eyes[1], eyes[1], log_likelihood)};
+  const auto same = [](const ViewChoice& a, const ViewChoice& b) {
+    return a.view == b.view && a.cosine == b.cosine && a.sine == b.sine;
+  };
 
+  std::fill(log_likelihood, log_likelihood + count, 0.0F);
   for (std::size_t i = 0; i < count; ++i) {
     const std::array<float, 9>& r = poses[i].rotation;
     const std::array<float, 3>& t = poses[i].translation;
@@ -219,20 +266,19 @@ void scorePoses(const ContourModel& model, std::size_t points, const EyeView* vi
                         -(r[2] * x + r[5] * y + r[8] * z)});
       if (choices[e].view != nullptr && choices[e].view->arrays.empty()) choices[e].view = nullptr;
     }
-    float total = 0;
-    if (choices[0].view != nullptr && choices[0].view == choices[1].view &&
-        eyes[0].focal_length == eyes[1].focal_length && choices[0].cosine == choices[1].cosine &&
-        choices[0].sine == choices[1].sine) {
-      total = scoreView<true>(choices[0].view->arrays.data(), entries, points,
-                              turned(r, choices[0]), t, eyes[0], eyes[1]);
-    } else {
-      for (std::size_t e = 0; e < eye_count; ++e)
-        if (choices[e].view != nullptr)
-          total += scoreView<false>(choices[e].view->arrays.data(), entries, points,
-                                    turned(r, choices[e]), t, eyes[e], eyes[e]);
+    if (choices[0].view != nullptr && same(choices[0], choices[1]) &&
+        eyes[0].focal_length == eyes[1].focal_length) {
+      both.add(i, choices[0].view->arrays.data(), entries, points, turned(r, choices[0]), t);
+      continue;
     }
-    log_likelihood[i] = std::isfinite(total) ? total : 0.0F;
+    for (std::size_t e = 0; e < eye_count; ++e)
+      if (choices[e].view != nullptr)
+        single[e].add(i, choices[e].view->arrays.data(), entries, points, turned(r, choices[e]), t);
   }
+  both.finish();
+  for (auto& batch : single) batch.finish();
+  for (std::size_t i = 0; i < count; ++i)
+    if (!std::isfinite(log_likelihood[i])) log_likelihood[i] = 0;
 }
 
 }  // namespace HWY_NAMESPACE

@@ -8,9 +8,8 @@ namespace leap_object_tracker {
 namespace {
 
 constexpr int kMargin = GainMap::kMargin;
-constexpr int kStampRow = 32;       // [bytes]
-constexpr double kSmoothing = 1.0;  // [px]
-constexpr double kLeastNoise = 4;   // of a Sobel response: images are rounded to grey levels
+constexpr int kStampRow = 32;      // [bytes]
+constexpr double kLeastNoise = 4;  // of a Sobel response: images are rounded to grey levels
 
 // Grey levels to a scale on which shot and read noise look the same everywhere (Anscombe 1948,
 // generalised): kStabilizedScale * sqrt(x + kStabilizedOffset).
@@ -30,13 +29,13 @@ const cv::Mat& varianceStabilizer() {
 }
 
 /// Standard deviation of a gradient image, from its median magnitude: edges are few.
-float robustDeviation(const cv::Mat& gradient) {
+float robustDeviation(const ImageMemory<std::int16_t>& gradient) {
   constexpr int kBins = 256;
   std::array<int, kBins> histogram{};
   int count = 0;
-  for (int v = 0; v < gradient.rows; v += 2) {
-    const auto* row = gradient.ptr<std::int16_t>(v);
-    for (int u = 0; u < gradient.cols; u += 2) {
+  for (int v = 0; v < gradient.rows(); v += 2) {
+    const std::int16_t* row = gradient.row(v);
+    for (int u = 0; u < gradient.columns(); u += 2) {
       ++histogram[static_cast<std::size_t>(std::min(std::abs(row[u]), kBins - 1))];
       ++count;
     }
@@ -59,17 +58,12 @@ void EdgeField::build(const cv::Mat& image, const cv::Rect& region) {
     return;
   }
   image_ = image(region_);
-  const cv::Mat& view = image_;
-  view.convertTo(padded_, CV_16SC1, 16.0);
-  cv::GaussianBlur(padded_, smooth_, cv::Size(5, 5), kSmoothing, kSmoothing);
-
-  cv::LUT(view, varianceStabilizer(), stabilized_);
-  cv::GaussianBlur(stabilized_, stabilized_, cv::Size(5, 5), kSmoothing, kSmoothing);
-  cv::Sobel(stabilized_, du_, CV_16S, 1, 0, 3);
-  cv::Sobel(stabilized_, dv_, CV_16S, 0, 1, 3);
+  detector_.smooth(image_, 16, smooth_memory_);
+  smooth_ = cv::Mat(image_.size(), CV_16SC1, smooth_memory_.row(0));
+  detector_.differentiate(image_, varianceStabilizer().ptr<std::uint8_t>());
 
   constexpr float kWeakest = 20;  // a step of 5 grey levels of 255 after smoothing
-  const float noise = std::max(robustDeviation(du_), robustDeviation(dv_));
+  const float noise = std::max(robustDeviation(detector_.du()), robustDeviation(detector_.dv()));
   // A Sobel response is 8 slopes; back from the stabilised scale by its derivative.
   const auto slope_noise =
       static_cast<float>(std::max(kLeastNoise, static_cast<double>(noise)) / 8 / kStabilizedScale);
@@ -78,13 +72,12 @@ void EdgeField::build(const cv::Mat& image, const cv::Rect& region) {
         2 * slope_noise *
         std::sqrt(static_cast<float>(grey) + static_cast<float>(kStabilizedOffset));
   const float high = std::max(kWeakest, 5.0F * noise);
-  cv::Canny(du_, dv_, edges_, 0.4F * high, high, true);
+  detector_.findEdges(0.4F * high, high);
 
-  for (int v = 0; v < edges_.rows; ++v) {
-    const auto* row = edges_.ptr<std::uint8_t>(v);
-    const auto *du = du_.ptr<std::int16_t>(v), *dv = dv_.ptr<std::int16_t>(v);
-    for (int u = 0; u < edges_.cols; ++u) {
-      if (row[u] == 0) continue;
+  for (int v = 0; v < image_.rows; ++v) {
+    const std::int16_t *du = detector_.du().row(v), *dv = detector_.dv().row(v);
+    for (int u = 0; u < image_.cols; ++u) {
+      if (!detector_.isEdge(u, v)) continue;
       const float degrees = cv::fastAtan2(static_cast<float>(du[u]), static_cast<float>(-dv[u]));
       edgels_.push_back({static_cast<std::int16_t>(u + region_.x),
                          static_cast<std::int16_t>(v + region_.y),

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -25,35 +26,100 @@ constexpr int kPatchSearch = 3;  // [scaled px] to both sides
 constexpr double kLeastCorrelation = 0.70;
 constexpr double kSurfThreshold = 30;  // of dlib's determinant of the Hessian, its own default
 
-/// What dlib's SURF descriptor reads of an image at the smallest scale: responses of Haar wavelets
-/// two pixels wide, straight from the pixels.
-struct HaarImage {
-  const cv::Mat& image;
+/// The SURF descriptor of dlib::compute_surf_descriptor at its smallest scale, about places that
+/// are whole pixels: responses of Haar wavelets two pixels wide, straight from the pixels, on a
+/// grid turned by the roll, summed up in 4 x 4 cells that overlap.
+class SurfSampling {
+ public:
+  /// @param roll [rad]
+  /// @param memory is used as long as this lives
+  SurfSampling(const cv::Mat& image, double roll, std::vector<WaveletResponse>& memory)
+      : row_(image.cols),
+        responses_(memory),
+        cosine_(static_cast<float>(std::cos(roll))),
+        sine_(static_cast<float>(std::sin(roll))) {
+    respond(image);
+    const double c = std::cos(roll), s = std::sin(roll);
+    for (std::size_t i = 0; i < offsets_.size(); ++i) {
+      constexpr double kHalf = kSide / 2;
+      const double from_u = static_cast<double>(i % kSide) - kHalf;
+      const double from_v = static_cast<double>(i / kSide) - kHalf;
+      const double u = std::floor(c * from_u - s * from_v + 0.5);
+      const double v = std::floor(s * from_u + c * from_v + 0.5);
+      offsets_[i] = static_cast<std::ptrdiff_t>(v) * row_ + static_cast<std::ptrdiff_t>(u);
+    }
+  }
+
+  FeatureDescriptor operator()(const cv::Point& place) const {
+    const WaveletResponse* centre = responses_.data() + place.y * row_ + place.x;
+    std::array<Sums, kStride * kStride> samples{};  // with a border of zeros
+    for (std::size_t y = 0; y < kSide; ++y) {
+      std::array<WaveletResponse, kSide> here;
+      for (std::size_t x = 0; x < kSide; ++x) here[x] = centre[offsets_[y * kSide + x]];
+      Sums* to = samples.data() + (y + 1) * kStride + 1;
+      for (std::size_t x = 0; x < kSide; ++x) {
+        const auto along_u = static_cast<float>(here[x].u), along_v = static_cast<float>(here[x].v);
+        const float along_x = cosine_ * along_u + sine_ * along_v;
+        const float along_y = cosine_ * along_v - sine_ * along_u;
+        to[x] = {along_x, along_y, std::abs(along_x), std::abs(along_y)};
+      }
+    }
+    FeatureDescriptor descriptor;
+    auto out = descriptor.begin();
+    for (std::size_t y = 0; y < kSide; y += kCell)
+      for (std::size_t x = 0; x < kSide; x += kCell) {
+        const Sums sums = sumOf(samples.data() + y * kStride + x);
+        out = std::copy(sums.begin(), sums.end(), out);
+      }
+    float square = 0;
+    for (const float value : descriptor) square += value * value;
+    const float factor = 1 / (std::sqrt(square) + 1e-7F);
+    for (float& value : descriptor) value *= factor;
+    return descriptor;
+  }
+
+ private:
+  void respond(const cv::Mat& image) {
+    responses_.resize(image.total());
+    for (int y = 1; y < image.rows; ++y) {
+      const auto *above = image.ptr<unsigned char>(y - 1), *here = image.ptr<unsigned char>(y);
+      WaveletResponse* to = responses_.data() + y * row_;
+      for (int x = 1; x < image.cols; ++x) {
+        const int falling = here[x] - above[x - 1], rising = above[x] - here[x - 1];
+        to[x] = {static_cast<std::int16_t>(falling + rising),
+                 static_cast<std::int16_t>(falling - rising)};
+      }
+    }
+  }
+
+  static constexpr std::size_t kSide = 20, kCell = 5, kReach = kCell + 2;  // samples
+  static constexpr std::size_t kStride = kSide + 2;
+  using Sums = std::array<float, 4>;  ///< of x, y, |x|, |y|
+
+  /// Over a cell and one sample around it, less the farther from its middle.
+  static Sums sumOf(const Sums* corner) {
+    static constexpr std::array<float, kReach> kWeights{1 / 4.0F, 1 / 5.0F, 1 / 6.0F, 1 / 7.0F,
+                                                        1 / 8.0F, 1 / 9.0F, 1 / 10.0F};
+    constexpr std::size_t kMiddle = kReach / 2;
+    const auto off = [](std::size_t i) { return i < kMiddle ? kMiddle - i : i - kMiddle; };
+    Sums sums{};
+#pragma GCC unroll 7
+    for (std::size_t y = 0; y < kReach; ++y)
+#pragma GCC unroll 7
+      for (std::size_t x = 0; x < kReach; ++x) {
+        const float weight = kWeights[off(y) + off(x)];
+        const Sums& sample = corner[y * kStride + x];
+        for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += weight * sample[k];
+      }
+    return sums;
+  }
+
+  std::ptrdiff_t row_;
+  std::vector<WaveletResponse>&
+      responses_;  ///< of each pixel but those of the first row and column
+  float cosine_, sine_;
+  std::array<std::ptrdiff_t, kSide * kSide> offsets_;
 };
-
-int haar_x(const HaarImage& haar, const dlib::point& place, long /*width*/) {
-  const unsigned char* above = haar.image.ptr<unsigned char>(static_cast<int>(place.y()) - 1);
-  const unsigned char* here = above + haar.image.step;
-  const long x = place.x();
-  return above[x] + here[x] - above[x - 1] - here[x - 1];
-}
-
-int haar_y(const HaarImage& haar, const dlib::point& place, long /*width*/) {
-  const unsigned char* above = haar.image.ptr<unsigned char>(static_cast<int>(place.y()) - 1);
-  const unsigned char* here = above + haar.image.step;
-  const long x = place.x();
-  return here[x - 1] + here[x] - above[x - 1] - above[x];
-}
-
-FeatureDescriptor describe(const cv::Mat& image, const cv::Point& place, double roll) {
-  dlib::matrix<double, 64, 1> values;
-  dlib::compute_surf_descriptor(HaarImage{image}, dlib::vector<double, 2>(place.x, place.y), 1.0,
-                                roll, values);
-  FeatureDescriptor descriptor;
-  for (long i = 0; i < 64; ++i)
-    descriptor[static_cast<std::size_t>(i)] = static_cast<float>(values(i));
-  return descriptor;
-}
 
 std::vector<dlib::interest_point> surfPoints(const cv::Mat& image) {
   dlib::array2d<unsigned char> copy(image.rows, image.cols);
@@ -69,13 +135,16 @@ std::vector<dlib::interest_point> surfPoints(const cv::Mat& image) {
   return points;
 }
 
-/// Between the darkest and the brightest twentieth [grey levels].
+/// Between the darkest and the brightest twentieth [grey levels], of every fourth pixel.
 int contrastOf(const cv::Mat& image) {
   std::array<int, 256> counts{};
-  for (int row = 0; row < image.rows; ++row)
-    for (int column = 0; column < image.cols; ++column)
-      ++counts[image.at<unsigned char>(row, column)];
-  const int part = image.rows * image.cols / 20;
+  int all = 0;
+  for (int row = 0; row < image.rows; row += 2) {
+    const unsigned char* values = image.ptr<unsigned char>(row);
+    for (int column = 0; column < image.cols; column += 2) ++counts[values[column]];
+    all += (image.cols + 1) / 2;
+  }
+  const int part = all / 20;
   int low = 0, high = 255;
   for (int sum = counts[0]; sum < part && low < 255; sum += counts[static_cast<std::size_t>(low)])
     ++low;
@@ -105,6 +174,55 @@ double correlation(const cv::Mat& a, const cv::Point& at_a, const cv::Mat& b,
   const double spread_b = sum_bb - sum_b * (sum_b / kCount);
   if (spread_a < kCount || spread_b < kCount) return 0;
   return (sum_ab - sum_a * (sum_b / kCount)) / std::sqrt(spread_a * spread_b);
+}
+
+/// Place on a row or column of pixels: between index and the next one, by weight / 256.
+struct Tap {
+  int index, next, weight;
+};
+
+/// Of the grid place / zoom; beyond the border the outermost pixel.
+Tap tapAt(int place, double zoom, int pixels) {
+  const double at = std::clamp(place / zoom, 0.0, pixels - 1.0);
+  const int index = static_cast<int>(at);
+  return {index, std::min(index + 1, pixels - 1), static_cast<int>(256 * (at - index))};
+}
+
+/// Bilinear. @param first the place of scaled(0, 0) on the grid
+void resample(const cv::Mat& image, const cv::Point& first, double zoom, cv::Mat& scaled) {
+  thread_local std::vector<Tap> columns;
+  thread_local std::array<std::vector<std::int16_t>, 2> rows;  // [1/64 grey levels]
+  std::array<int, 2> known{-1, -1};
+  const auto width = static_cast<std::size_t>(scaled.cols);
+  columns.resize(width);
+  for (std::size_t x = 0; x < width; ++x)
+    columns[x] = tapAt(first.x + static_cast<int>(x), zoom, image.cols);
+  const auto rowAt = [&](int index) {
+    const auto slot = static_cast<std::size_t>(index % 2);
+    if (known[slot] != index) {
+      known[slot] = index;
+      rows[slot].resize(width);
+      const unsigned char* from = image.ptr<unsigned char>(index);
+      for (std::size_t x = 0; x < width; ++x) {
+        const Tap& tap = columns[x];
+        rows[slot][x] = static_cast<std::int16_t>(
+            ((from[tap.index] << 8) + tap.weight * (from[tap.next] - from[tap.index])) >> 2);
+      }
+    }
+    return rows[slot].data();
+  };
+  for (int y = 0; y < scaled.rows; ++y) {
+    const Tap tap = tapAt(first.y + y, zoom, image.rows);
+    const std::int16_t *upper = rowAt(tap.index), *lower = rowAt(tap.next);
+    unsigned char* to = scaled.ptr<unsigned char>(y);
+    const int weight = tap.weight << 7;
+    for (std::size_t x = 0; x < width; ++x) {
+      // In 16 bits, so that the compiler takes as many at a time as it can.
+      const auto twice = static_cast<std::int16_t>(2 * (lower[x] - upper[x]));
+      const auto value = static_cast<std::int16_t>(upper[x] + (twice * weight >> 16));
+      to[x] = static_cast<unsigned char>((value + 32) >> 6);
+    }
+  }
 }
 
 bool patchFits(const cv::Mat& image, const cv::Point& place) {
@@ -195,9 +313,8 @@ void FeatureExtractor::prepare(const cv::Mat& image, const cv::Rect& region, dou
   const cv::Size size(gridFloor(region.x + region.width) - first_column + kMargin,
                       gridFloor(region.y + region.height) - first_row + kMargin);
   eye.origin = cv::Point2d(first_column / zoom, first_row / zoom);
-  const cv::Matx23d image_from_scaled(1 / zoom, 0, eye.origin.x, 0, 1 / zoom, eye.origin.y);
-  cv::warpAffine(image, eye.scaled, image_from_scaled, size,
-                 cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  eye.scaled.create(size, CV_8UC1);
+  resample(image, {first_column, first_row}, zoom, eye.scaled);
 
   if (detector_ == CornerDetector::kFast) {
     findFast(eye);
@@ -210,9 +327,8 @@ void FeatureExtractor::prepare(const cv::Mat& image, const cv::Rect& region, dou
         eye.corners.push_back({place, static_cast<float>(point.score), {}});
     }
   }
-  tbb::parallel_for(std::size_t{0}, eye.corners.size(), [&](std::size_t i) {
-    eye.corners[i].descriptor = describe(eye.scaled, eye.corners[i].place, roll);
-  });
+  const SurfSampling describe(eye.scaled, roll, eye.responses);
+  for (Corner& corner : eye.corners) corner.descriptor = describe(corner.place);
 }
 
 void FeatureExtractor::findFast(EyeImage& eye) const {
@@ -225,17 +341,22 @@ void FeatureExtractor::findFast(EyeImage& eye) const {
   eye.taken.create(eye.scaled.size(), CV_8UC1);
   eye.taken = 0;
   cv::FAST(eye.scaled, found, threshold, true);
-  std::sort(found.begin(), found.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
-    return std::make_tuple(-a.response, a.pt.y, a.pt.x) <
+  // The strongest first, from a heap: of many only the first few are wanted.
+  const auto weaker = [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+    return std::make_tuple(-a.response, a.pt.y, a.pt.x) >
            std::make_tuple(-b.response, b.pt.y, b.pt.x);
-  });
-  for (const auto& point : found) {
+  };
+  std::make_heap(found.begin(), found.end(), weaker);
+  for (auto last = found.end(); last != found.begin(); --last) {
     if (eye.corners.size() >= static_cast<std::size_t>(params_.corners)) break;
+    std::pop_heap(found.begin(), last, weaker);
+    const cv::KeyPoint& point = *(last - 1);
     const cv::Point place(cvRound(point.pt.x), cvRound(point.pt.y));
     if (!inside.contains(place)) continue;
     if (eye.taken.at<unsigned char>(place) != 0) continue;
-    eye.taken(cv::Rect(place.x - kCornerSpacing + 1, place.y - kCornerSpacing + 1,
-                       2 * kCornerSpacing - 1, 2 * kCornerSpacing - 1)) = 1;
+    for (int y = -kCornerSpacing + 1; y < kCornerSpacing; ++y)
+      std::memset(eye.taken.ptr(place.y + y, place.x - kCornerSpacing + 1), 1,
+                  2 * kCornerSpacing - 1);
     eye.corners.push_back({place, point.response, {}});
   }
 }
@@ -249,12 +370,9 @@ void FeatureExtractor::match(const FeatureWindow& window, double zoom) {
   };
   const double fb = camera_.focal_length * camera_.baseline;
   const double least = fb / window.farthest, most = fb / window.nearest;
-  constexpr float kFar = std::numeric_limits<float>::infinity();
-  struct Best {
-    float distance = kFar, second = kFar;
-    int index = -1;
-  };
-  std::vector<Best> of_left(left.corners.size()), of_right(right.corners.size());
+  auto& [of_left, of_right] = nearest_;
+  of_left.assign(left.corners.size(), Best());
+  of_right.assign(right.corners.size(), Best());
   const auto offer = [](Best& best, float distance, std::size_t index) {
     if (distance < best.distance) {
       best.second = best.distance;

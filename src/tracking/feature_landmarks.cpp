@@ -81,11 +81,13 @@ double LandmarkMap::rollOf(const Eigen::Matrix3d& camera_from_object) const {
                          : view->roll + rollBetween(view->camera_from_object, camera_from_object);
 }
 
-std::vector<int> LandmarkMap::match(const std::vector<StereoFeature>& features,
-                                    const Pose& camera_from_object, double reach) const {
-  std::vector<int> matches(features.size(), -1);
-  std::vector<float> distances(features.size(), std::numeric_limits<float>::infinity());
-  std::vector<int> feature_of(landmarks_.size(), -1);
+void LandmarkMap::match(const std::vector<StereoFeature>& features, const Pose& camera_from_object,
+                        double reach, std::vector<int>& matches) const {
+  matches.assign(features.size(), -1);
+  thread_local std::vector<float> distances;
+  distances.assign(features.size(), std::numeric_limits<float>::infinity());
+  thread_local std::vector<int> feature_of;
+  feature_of.assign(landmarks_.size(), -1);
   const Pose object_from_camera = camera_from_object.inverse();
   for (std::size_t i = 0; i < features.size(); ++i) {
     const Eigen::Vector3f spot = (object_from_camera * features[i].point_in_camera).cast<float>();
@@ -123,7 +125,6 @@ std::vector<int> LandmarkMap::match(const std::vector<StereoFeature>& features,
     matches[i] = found;
     distances[i] = best;
   }
-  return matches;
 }
 
 int LandmarkMap::expected(const Pose& camera_from_object) const {
@@ -144,7 +145,7 @@ void LandmarkMap::learn(const std::vector<StereoFeature>& features, const std::v
     views_.push_back({camera_from_object.linear(), roll});
 
   const Pose object_from_camera = camera_from_object.inverse();
-  std::vector<bool> seen(landmarks_.size(), false);
+  seen_.assign(landmarks_.size(), false);
   const std::size_t known = landmarks_.size();
   for (std::size_t i = 0; i < features.size(); ++i) {
     if (!on_surface[i]) continue;
@@ -152,7 +153,7 @@ void LandmarkMap::learn(const std::vector<StereoFeature>& features, const std::v
     const auto variance = static_cast<float>(features[i].covariance.trace() / 3 + pose_variance);
     if (matches[i] >= 0) {
       Landmark& landmark = landmarks_[static_cast<std::size_t>(matches[i])];
-      seen[static_cast<std::size_t>(matches[i])] = true;
+      seen_[static_cast<std::size_t>(matches[i])] = true;
       // What the pose errs by is common to all sights: the variance never falls below it.
       const float gain = landmark.variance / (landmark.variance + variance);
       landmark.position += gain * (spot - landmark.position);
@@ -180,7 +181,7 @@ void LandmarkMap::learn(const std::vector<StereoFeature>& features, const std::v
   }
   const Eigen::Vector3f eye = object_from_camera.translation().cast<float>();
   for (std::size_t k = 0; k < known; ++k)
-    if (!seen[k] && (eye - landmarks_[k].position).normalized().dot(landmarks_[k].view) > 0.97F)
+    if (!seen_[k] && (eye - landmarks_[k].position).normalized().dot(landmarks_[k].view) > 0.97F)
       ++landmarks_[k].missed;
   makeRoom();
 }

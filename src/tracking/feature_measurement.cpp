@@ -14,32 +14,8 @@ constexpr int kIterations = 10;             // of Gauss-Newton, at most
 constexpr double kStill = 1e-5;             // [m] a smaller step is the last
 constexpr double kTrusted = 0.5;            // probability that a feature belongs to the object
 
-/// log(1 + exp(-x)) for x from 0 on, between nodes of a table; zero beyond it.
-class SoftplusTail {
- public:
-  SoftplusTail() {
-    for (std::size_t i = 0; i < nodes_.size(); ++i)
-      nodes_[i] = std::log1p(std::exp(-static_cast<float>(i) / kNodesPerUnit));
-    nodes_.back() = 0;
-  }
-  float operator()(float x) const {
-    const float place = std::min(x * kNodesPerUnit, static_cast<float>(nodes_.size()) - 1.5F);
-    const auto node = static_cast<std::size_t>(place);
-    const float part = place - static_cast<float>(node);
-    return x < kReach ? nodes_[node] + part * (nodes_[node + 1] - nodes_[node]) : 0;
-  }
-
- private:
-  static constexpr float kNodesPerUnit = 32;
-  static constexpr float kReach = 12;
-  std::array<float, 12 * 32 + 2> nodes_{};
-};
-
-/// log(1 + exp(x)), to 1e-4.
-float softplus(float x) {
-  static const SoftplusTail tail;
-  return std::max(x, 0.0F) + tail(std::abs(x));
-}
+/// log(1 + exp(x))
+double softplus(double x) { return std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x))); }
 double sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
@@ -73,12 +49,13 @@ void FeatureMeasurement::observe(const RectifiedStereoFrame& frame,
 }
 
 void FeatureMeasurement::expect(const Pose& predicted, double uncertainty) {
-  matches_ = landmarks_.match(features_, predicted, std::max(kLeastReach, 3 * uncertainty));
+  landmarks_.match(features_, predicted, std::max(kLeastReach, 3 * uncertainty), matches_);
   makePoints();
 }
 
 void FeatureMeasurement::makePoints() {
   points_.clear();
+  arrays_.clear();
   // Densities of a mixture: of the object, or anywhere within the range.
   const double odds = (1 - params_.outlier_share) / params_.outlier_share;
   for (std::size_t i = 0; i < features_.size(); ++i) {
@@ -102,32 +79,18 @@ void FeatureMeasurement::makePoints() {
       point.peak = static_cast<float>(std::log(odds * std::pow(kRange, 3) / volume));
     }
     points_.push_back(point);
+    if (point.has_landmark)
+      arrays_.addLandmark(point.in_camera, point.landmark, point.information, point.peak);
+    else
+      arrays_.addSurfacePoint(point.in_camera, point.variance, point.peak);
   }
+  arrays_.pad();
 }
 
 void FeatureMeasurement::score(const ParticlePose* poses, std::size_t count,
                                float* log_likelihood) const {
-  for (std::size_t i = 0; i < count; ++i) log_likelihood[i] = scoreOne(poses[i]);
-}
-
-float FeatureMeasurement::scoreOne(const ParticlePose& pose) const {
-  const Eigen::Matrix3f rotation =
-      Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(pose.rotation.data());
-  const Eigen::Map<const Eigen::Vector3f> place(pose.translation.data());
-  float sum = 0;
-  for (const Point& point : points_) {
-    const Eigen::Vector3f arm = point.in_camera - place;
-    float square = 0;
-    if (point.has_landmark) {
-      const Eigen::Vector3f apart = arm - rotation * point.landmark;
-      square = apart.dot(point.information * apart);
-    } else {
-      const float distance = distance_(rotation.transpose() * arm);
-      square = distance * distance / point.variance;
-    }
-    sum += softplus(point.peak - 0.5F * square);
-  }
-  return static_cast<float>(params_.independent_share) * sum;
+  scoreFeatures(arrays_, distance_, static_cast<float>(params_.independent_share), poses, count,
+                log_likelihood);
 }
 
 FeatureSupport FeatureMeasurement::support(const Pose& camera_from_object) const {
@@ -145,7 +108,7 @@ FeatureSupport FeatureMeasurement::support(const Pose& camera_from_object) const
       jacobian << Eigen::Matrix3d::Identity(), -skew(turned);
       sums.landmark_information += belongs * jacobian.transpose() * weight * jacobian;
       sums.landmark_gradient += belongs * jacobian.transpose() * weight * apart;
-      sums.log_likelihood += softplus(static_cast<float>(exponent));
+      sums.log_likelihood += softplus(exponent);
       sums.landmark_points += belongs;
     } else {
       Eigen::Vector3f slope;
@@ -157,7 +120,7 @@ FeatureSupport FeatureMeasurement::support(const Pose& camera_from_object) const
       jacobian << normal, arm.cross(normal);
       sums.information += belongs / point.variance * jacobian * jacobian.transpose();
       sums.gradient += belongs / point.variance * distance * jacobian;
-      sums.log_likelihood += softplus(static_cast<float>(exponent));
+      sums.log_likelihood += softplus(exponent);
       sums.surface_points += belongs;
     }
   }
@@ -207,20 +170,20 @@ PosePrior FeatureMeasurement::refine(const PosePrior& prior,
 void FeatureMeasurement::learn(const Pose& camera_from_object, double position_sigma,
                                double rotation_sigma) {
   const Pose object_from_camera = camera_from_object.inverse();
-  std::vector<bool> on_surface(features_.size(), false);
+  on_surface_.assign(features_.size(), false);
   for (std::size_t i = 0; i < features_.size(); ++i) {
     const Point& point = points_[i];
     const Eigen::Vector3f spot = (object_from_camera * features_[i].point_in_camera).cast<float>();
     const float distance = distance_(spot);
-    on_surface[i] = distance * distance < 9 * point.variance;
+    on_surface_[i] = distance * distance < 9 * point.variance;
     if (!point.has_landmark) continue;
     const Eigen::Vector3d apart =
         features_[i].point_in_camera - camera_from_object * point.landmark.cast<double>();
     if (sigmoid(point.peak - 0.5 * apart.dot(point.information.cast<double>() * apart)) < kTrusted)
-      on_surface[i] = false;
+      on_surface_[i] = false;
   }
   const double turn = radius_ * rotation_sigma;
-  landmarks_.learn(features_, matches_, on_surface, camera_from_object,
+  landmarks_.learn(features_, matches_, on_surface_, camera_from_object,
                    position_sigma * position_sigma + turn * turn);
 }
 

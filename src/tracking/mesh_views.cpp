@@ -18,6 +18,7 @@
 #include <set>
 
 #include "contour_segments.hpp"
+#include "sight_lines.hpp"
 
 namespace leap_object_tracker {
 namespace {
@@ -98,125 +99,6 @@ std::vector<double> hullDistances(const Mesh& mesh, const std::vector<Vector3f>&
   return distances;
 }
 
-/// Says whether a line of sight is free. A tree of boxes, split at the median.
-class SightLines {
- public:
-  explicit SightLines(const Mesh& mesh) {
-    std::vector<Vector3f> centers;
-    for (const auto& t : mesh.triangles) {
-      Triangle triangle;
-      triangle.corner = mesh.vertices[t[0]].cast<float>();
-      triangle.first = (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cast<float>();
-      triangle.second = (mesh.vertices[t[2]] - mesh.vertices[t[0]]).cast<float>();
-      triangles_.push_back(triangle);
-      centers.push_back(triangle.corner + (triangle.first + triangle.second) / 3);
-    }
-    std::vector<std::uint32_t> order(triangles_.size());
-    std::iota(order.begin(), order.end(), 0U);
-    nodes_.reserve(triangles_.size());
-    if (!order.empty()) build(centers, order, 0, order.size());
-    std::vector<Triangle> sorted;
-    for (const std::uint32_t i : order) sorted.push_back(triangles_[i]);
-    triangles_ = std::move(sorted);
-  }
-
-  bool blocked(const Vector3f& from, const Vector3f& to) const {
-    if (nodes_.empty()) return false;
-    const Vector3f way = to - from;
-    const Eigen::Array4f start(from.x(), from.y(), from.z(), 0);
-    const Eigen::Array4f inverse(1 / way.x(), 1 / way.y(), 1 / way.z(), 1);
-    std::array<std::uint32_t, 64> waiting;
-    std::size_t count = 0;
-    waiting[count++] = 0;
-    while (count > 0) {
-      const std::uint32_t index = waiting[--count];
-      const Node& node = nodes_[index];
-      if (!crosses(node, start, inverse)) continue;
-      if (node.triangles > 0) {
-        for (std::uint32_t i = node.next; i < node.next + node.triangles; ++i)
-          if (hits(triangles_[i], from, way)) return true;
-      } else {
-        waiting[count++] = node.next;
-        waiting[count++] = index + 1;
-      }
-    }
-    return false;
-  }
-
- private:
-  struct Triangle {
-    Vector3f corner, first, second;
-  };
-  struct Node {
-    Eigen::Array4f low, high;     ///< the fourth entry is any wide span, to fill a register
-    std::uint32_t next = 0;       ///< first triangle of a leaf, else the second child
-    std::uint32_t triangles = 0;  ///< zero: the first child is the node behind this one
-  };
-
-  void build(const std::vector<Vector3f>& centers, std::vector<std::uint32_t>& order,
-             std::size_t begin, std::size_t end) {
-    const std::size_t index = nodes_.size();
-    nodes_.emplace_back();
-    Node node;
-    Eigen::Array3f low = Eigen::Array3f::Constant(std::numeric_limits<float>::max());
-    Eigen::Array3f high = -low, least = low, most = high;
-    for (std::size_t i = begin; i < end; ++i) {
-      const Triangle& t = triangles_[order[i]];
-      const Vector3f second = t.corner + t.first, third = t.corner + t.second;
-      for (const Vector3f& corner : {t.corner, second, third}) {
-        low = low.min(corner.array());
-        high = high.max(corner.array());
-      }
-      least = least.min(centers[order[i]].array());
-      most = most.max(centers[order[i]].array());
-    }
-    // Flat boxes would miss rays in their plane by rounding.
-    const float margin = 1e-6F * low.abs().max(high.abs()).maxCoeff();
-    node.low = {low.x() - margin, low.y() - margin, low.z() - margin, -1};
-    node.high = {high.x() + margin, high.y() + margin, high.z() + margin, 1};
-    if (end - begin <= 4) {
-      node.next = static_cast<std::uint32_t>(begin);
-      node.triangles = static_cast<std::uint32_t>(end - begin);
-    } else {
-      Eigen::Index axis = 0;
-      (most - least).maxCoeff(&axis);
-      const std::size_t middle = (begin + end) / 2;
-      const auto at = [&](std::size_t i) { return order.begin() + static_cast<std::ptrdiff_t>(i); };
-      std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
-        return centers[a][axis] != centers[b][axis] ? centers[a][axis] < centers[b][axis] : a < b;
-      });
-      build(centers, order, begin, middle);
-      node.next = static_cast<std::uint32_t>(nodes_.size());
-      build(centers, order, middle, end);
-    }
-    nodes_[index] = node;
-  }
-
-  static bool crosses(const Node& node, const Eigen::Array4f& from, const Eigen::Array4f& inverse) {
-    const Eigen::Array4f a = (node.low - from) * inverse;
-    const Eigen::Array4f b = (node.high - from) * inverse;
-    return std::max(a.min(b).maxCoeff(), 0.0F) <= std::min(a.max(b).minCoeff(), 1.0F);
-  }
-
-  /// Möller and Trumbore, Fast, minimum storage ray/triangle intersection, 1997.
-  static bool hits(const Triangle& t, const Vector3f& from, const Vector3f& way) {
-    const Vector3f p = way.cross(t.second);
-    const float determinant = t.first.dot(p);
-    if (determinant == 0) return false;
-    const Vector3f offset = from - t.corner;
-    const float u = offset.dot(p) / determinant;
-    if (!(u >= 0 && u <= 1)) return false;
-    const Vector3f q = offset.cross(t.first);
-    const float v = way.dot(q) / determinant;
-    if (!(v >= 0 && u + v <= 1)) return false;
-    const float along = t.second.dot(q) / determinant;
-    return along > 0 && along < 1;
-  }
-
-  std::vector<Triangle> triangles_;
-  std::vector<Node> nodes_;
-};
-
 /// Each triangle once, whichever way round it is given.
 Mesh withoutRepeatedTriangles(const Mesh& mesh) {
   std::vector<std::size_t> order(mesh.triangles.size());
@@ -250,15 +132,17 @@ class ContourFinder {
   }
 
   std::vector<ContourSegment> segmentsFrom(const Vector3d& eye) const {
-    std::vector<std::uint8_t> faces_eye(planes_.size());
-    for (std::size_t t = 0; t < planes_.size(); ++t)
-      faces_eye[t] = planes_[t].head<3>().dot(eye) + planes_[t].w() > 0 ? 1 : 0;
-
     std::vector<ContourSegment> segments;
-    for (std::size_t i = 0; i < sides_.size(); ++i) {
-      const Sides& sides = sides_[i];
-      const bool outline = (faces_eye[sides.first] ^ faces_eye[sides.second] ^ sides.flipped) != 0;
-      if (outline || sides.always) addVisible(edges_[i], outline, eye, segments);
+    std::uint32_t blocker = 0;
+    for (std::size_t patch = 0; patch < patches_.size(); ++patch) {
+      if (patches_[patch].looksOneWay(eye)) continue;
+      const std::size_t first = patch * kPatchEdges;
+      for (std::size_t i = first; i < std::min(first + kPatchEdges, sides_.size()); ++i) {
+        const Sides& sides = sides_[i];
+        const bool outline =
+            (facesEye(sides.first, eye) != facesEye(sides.second, eye)) != sides.flipped;
+        if (outline || sides.always) addVisible(edges_[i], outline, eye, blocker, segments);
+      }
     }
     return segments;
   }
@@ -278,13 +162,62 @@ class ContourFinder {
     bool opposed = false;  ///< the triangles are given in opposite turns
   };
 
-  /// What decides whether an edge is contour, apart from the rest: all edges are asked for every
+  /// What decides whether an edge is contour, apart from the rest: many edges are asked for every
   /// view. It is outline if one of the two triangles looks at the eye, or, if flipped, both or
   /// none.
   struct Sides {
     std::uint32_t first, second;
     bool flipped, always;
   };
+
+  static constexpr std::size_t kPatchEdges = 32;
+
+  /// Bounds of the planes at neighbouring edges: for most eyes all look at it, or none, and no edge
+  /// is outline.
+  struct Patch {
+    Vector3d center = Vector3d::Zero(), normal = Vector3d::Zero();
+    double spread = 0;               ///< of the normals about the mean one
+    double lowest = 0, highest = 0;  ///< [m] of the planes below the centre
+    double margin = 0;               ///< [m] of rounding
+    bool never_skipped = false;      ///< holds edges that do not depend on that
+
+    bool looksOneWay(const Vector3d& eye) const {
+      const Vector3d way = eye - center;
+      const double height = normal.dot(way), doubt = spread * way.norm() + margin;
+      return !never_skipped && (height - doubt + lowest > 0 || height + doubt + highest < 0);
+    }
+  };
+
+  bool facesEye(std::uint32_t triangle, const Vector3d& eye) const {
+    const Eigen::Vector4d& plane = planes_[triangle];
+    return plane.head<3>().dot(eye) + plane.w() > 0;
+  }
+
+  void findPatches() {
+    for (std::size_t first = 0; first < sides_.size(); first += kPatchEdges) {
+      const std::size_t end = std::min(first + kPatchEdges, sides_.size());
+      std::vector<std::uint32_t> triangles;
+      Patch patch;
+      for (std::size_t i = first; i < end; ++i) {
+        patch.never_skipped = patch.never_skipped || sides_[i].always || sides_[i].flipped;
+        patch.center +=
+            (edges_[i].start + edges_[i].end) / (2.0 * static_cast<double>(end - first));
+        triangles.insert(triangles.end(), {sides_[i].first, sides_[i].second});
+      }
+      for (const std::uint32_t t : triangles)
+        patch.normal += normals_[t] / static_cast<double>(triangles.size());
+      patch.lowest = std::numeric_limits<double>::max();
+      patch.highest = std::numeric_limits<double>::lowest();
+      for (const std::uint32_t t : triangles) {
+        const double below = normals_[t].dot(patch.center) + planes_[t].w();
+        patch.spread = std::max(patch.spread, (normals_[t] - patch.normal).norm());
+        patch.lowest = std::min(patch.lowest, below);
+        patch.highest = std::max(patch.highest, below);
+      }
+      patch.margin = 1e-9 * radius_;
+      patches_.push_back(patch);
+    }
+  }
 
   bool forwards(std::size_t triangle, std::uint32_t start, std::uint32_t end) const {
     const auto& t = mesh_.triangles[triangle];
@@ -364,10 +297,11 @@ class ContourFinder {
                         edge.kind == Kind::kOpen || (edge.opposed && !branching),
                         edge.kind != Kind::kSmooth});
     }
+    findPatches();
   }
 
   /// Cuts an edge into pieces short enough to be wholly visible or wholly hidden.
-  void addVisible(const Edge& edge, bool outline, const Vector3d& eye,
+  void addVisible(const Edge& edge, bool outline, const Vector3d& eye, std::uint32_t& blocker,
                   std::vector<ContourSegment>& segments) const {
     const Vector3d along = edge.end - edge.start;
     const Vector3d to_eye = eye - (edge.start + edge.end) / 2;
@@ -382,7 +316,7 @@ class ContourFinder {
       const Vector3d ray = (eye - middle).normalized();
       const Vector3d free = freeSide(edge, outline, ray);
       const Vector3d from = middle + kOffSurface * radius_ * (free + ray);
-      if (sight_.blocked(from.cast<float>(), eye.cast<float>())) continue;
+      if (sight_.blocked(from.cast<float>(), eye.cast<float>(), blocker)) continue;
       if (outline && edge.kind == Kind::kSmooth) {
         addLimb(edge, start, end, ray, segments);
         continue;
@@ -450,7 +384,8 @@ class ContourFinder {
   std::vector<Vector3d> normals_;
   std::vector<Eigen::Vector4d> planes_;
   std::vector<Edge> edges_;
-  std::vector<Sides> sides_;  ///< of each edge
+  std::vector<Sides> sides_;    ///< of each edge
+  std::vector<Patch> patches_;  ///< of kPatchEdges neighbouring edges each
 };
 
 MeshViews computeViews(const Mesh& mesh, int points) {
@@ -544,7 +479,7 @@ class ViewFile {
   }
 
  private:
-  static constexpr std::uint64_t kVersion = 4;  ///< of the format and of how views are found
+  static constexpr std::uint64_t kVersion = 5;  ///< of the format and of how views are found
   static_assert(sizeof(ContourPoint) == 17 * sizeof(float), "written as bytes, without gaps");
 
   template <class T>

@@ -13,11 +13,15 @@ namespace {
 
 constexpr std::size_t kGrain = 256;
 constexpr std::size_t kSample = 4096;  // particles that the power of a layer is chosen by, at most
+constexpr std::size_t kThinnedFrom = 10000;  // particles; larger sets are thinned by a layer
+constexpr std::size_t kThinned = 4;          // to one of so many
+
+std::size_t piecesOf(std::size_t count) { return (count + kGrain - 1) / kGrain; }
 
 /// Calls body(first, count) for pieces of a set, the same ones whatever the number of threads.
 template <class Body>
 void forPieces(std::size_t count, const Body& body) {
-  tbb::parallel_for(std::size_t{0}, (count + kGrain - 1) / kGrain, [&](std::size_t piece) {
+  tbb::parallel_for(std::size_t{0}, piecesOf(count), [&](std::size_t piece) {
     body(piece * kGrain, std::min(kGrain, count - piece * kGrain));
   });
 }
@@ -42,38 +46,38 @@ ParticleTwist toFloats(const Twist& twist) {
 
 ParticleFilter::ParticleFilter(const FilterParams& params) : params_(params) {
   setCount(params.particles);
+  resize(wanted_);
+  sample_.reserve(std::min(wanted_, kSample));
 }
 
-void ParticleFilter::setCount(int particles) {
-  const auto count = static_cast<std::size_t>(particles);
-  const std::size_t old = poses_.size();
-  if (count == old) return;
-  // Neighbours are of the same parent: a part of the set would not be like the whole.
-  spare_poses_.resize(count);
-  spare_velocities_.resize(count);
-  for (std::size_t i = 0; i < count && old > 0; ++i) {
-    spare_poses_[i] = poses_[i * old / count];
-    spare_velocities_[i] = velocities_[i * old / count];
-  }
-  poses_.swap(spare_poses_);
-  velocities_.swap(spare_velocities_);
-  spare_poses_.resize(count);
-  spare_velocities_.resize(count);
-  log_likelihoods_.assign(count, 0);
-  sample_.reserve(std::min(count, kSample));
+std::size_t ParticleFilter::thinned(std::size_t particles) {
+  return std::max(std::min(particles, kThinnedFrom), particles / kThinned);
+}
+
+/// Leaves the particles unwritten.
+void ParticleFilter::resize(std::size_t count) {
+  poses_.resize(count);
+  velocities_.resize(count);
+  log_likelihoods_.resize(count);
   weights_.resize(count);
-  chosen_.resize(count);
-  twist_sums_.resize((count + kGrain - 1) / kGrain);
-  weight_sums_.resize(twist_sums_.size());
+  bests_.resize(piecesOf(count));
+  twist_sums_.resize(piecesOf(count));
+  weight_sums_.resize(piecesOf(count));
+  passed_.resize(piecesOf(count) + 1);
   forgetWeights();
 }
 
 void ParticleFilter::forgetWeights() {
-  std::fill(weights_.begin(), weights_.end(), 1.0F / static_cast<float>(weights_.size()));
+  std::fill(weights_.begin(), weights_.end(), 1.0F);
+  for (std::size_t piece = 0; piece < weight_sums_.size(); ++piece) {
+    const auto size = static_cast<double>(std::min(kGrain, weights_.size() - piece * kGrain));
+    weight_sums_[piece] = {size, size};
+  }
 }
 
 void ParticleFilter::initialize(const Pose& mean, const Matrix6d& covariance, const Twist& velocity,
                                 const Matrix6d& velocity_covariance) {
+  resize(wanted_);
   inject(1.0, mean, covariance, velocity, velocity_covariance);
 }
 
@@ -110,27 +114,38 @@ void ParticleFilter::predict(const MotionParams& motion, double dt, const Pose& 
   const ParticlePose moved = toParticlePose(camera_motion);
   step.turn = moved.rotation;
   step.shift = moved.translation;
-  forPieces(poses_.size(), [&](std::size_t first, std::size_t size) {
+  const std::size_t old = poses_.size();
+  if (old != wanted_) {
+    // Neighbours are of the same parent: a part of the set would not be like the whole.
+    poses_.swap(spare_poses_);
+    velocities_.swap(spare_velocities_);
+    resize(wanted_);
+  }
+  forPieces(wanted_, [&](std::size_t first, std::size_t size) {
+    for (std::size_t i = first; i < first + size && old != wanted_; ++i) {
+      poses_[i] = spare_poses_[i * old / wanted_];
+      velocities_[i] = spare_velocities_[i * old / wanted_];
+    }
     predictParticles(step, stream, first, size, poses_.data() + first, velocities_.data() + first);
   });
 }
 
 void ParticleFilter::score(const BatchScorer& scorer) {
   forPieces(poses_.size(), [&](std::size_t first, std::size_t size) {
-    scorer(poses_.data() + first, size, log_likelihoods_.data() + first);
+    float* scores = log_likelihoods_.data() + first;
+    scorer(poses_.data() + first, size, scores);
+    bests_[first / kGrain] = *std::max_element(scores, scores + size);
   });
 }
 
-void ParticleFilter::normalizeWeights(double power) {
-  const float best = *std::max_element(log_likelihoods_.begin(), log_likelihoods_.end());
+void ParticleFilter::computeWeights(double power) {
+  const float best = *std::max_element(bests_.begin(), bests_.end());
   forPieces(weights_.size(), [&](std::size_t first, std::size_t size) {
     weight_sums_[first / kGrain] = exponentials(log_likelihoods_.data() + first, size, best,
                                                 static_cast<float>(power), weights_.data() + first);
   });
   double sum = 0, squares = 0;
   for (const WeightSums& piece : weight_sums_) sum += piece.sum, squares += piece.squares;
-  const auto factor = static_cast<float>(1 / sum);
-  for (float& weight : weights_) weight *= factor;
   effective_share_ = sum * sum / (squares * static_cast<double>(weights_.size()));
 }
 
@@ -154,38 +169,48 @@ double ParticleFilter::powerFor(double survival) {
   return low;
 }
 
-void ParticleFilter::drawIndices() {
+/// Systematic resampling (Kitagawa 1996) to `count` particles.
+void ParticleFilter::drawByWeight(std::size_t count) {
   CounterRandom random(params_.seed, ++draw_, 0);
-  const double step = 1.0 / static_cast<double>(weights_.size());
-  double target = random.uniform() * step, passed = static_cast<double>(weights_[0]);
-  std::uint32_t source = 0;
-  for (std::uint32_t& index : chosen_) {
-    while (passed < target && source + 1 < weights_.size())
-      passed += static_cast<double>(weights_[++source]);
-    index = source;
-    target += step;
-  }
-}
-
-void ParticleFilter::resample(double resample_below) {
-  if (effective_share_ >= resample_below) return;
-  drawIndices();
-  forPieces(poses_.size(), [&](std::size_t first, std::size_t size) {
-    for (std::size_t i = first; i < first + size; ++i) {
-      spare_poses_[i] = poses_[chosen_[i]];
-      spare_velocities_[i] = velocities_[chosen_[i]];
+  passed_[0] = 0;
+  for (std::size_t piece = 0; piece < weight_sums_.size(); ++piece)
+    passed_[piece + 1] = passed_[piece] + weight_sums_[piece].sum;
+  const double step = passed_.back() / static_cast<double>(count);
+  const double offset = random.uniform();
+  // The first child whose place on the line of all weights is behind those of a piece.
+  const auto firstChild = [&](std::size_t piece) {
+    if (piece == weight_sums_.size()) return count;
+    const double child = std::ceil(passed_[piece] / step - offset);
+    return static_cast<std::size_t>(std::clamp(child, 0.0, static_cast<double>(count)));
+  };
+  spare_poses_.resize(count);
+  spare_velocities_.resize(count);
+  forPieces(weights_.size(), [&](std::size_t first, std::size_t size) {
+    const std::size_t piece = first / kGrain, end = firstChild(piece + 1);
+    std::size_t source = first;
+    double passed = passed_[piece] + static_cast<double>(weights_[source]);
+    for (std::size_t child = firstChild(piece); child < end; ++child) {
+      const double target = (offset + static_cast<double>(child)) * step;
+      while (passed < target && source + 1 < first + size)
+        passed += static_cast<double>(weights_[++source]);
+      spare_poses_[child] = poses_[source];
+      spare_velocities_[child] = velocities_[source];
     }
   });
   poses_.swap(spare_poses_);
   velocities_.swap(spare_velocities_);
-  forgetWeights();
+  resize(count);
+}
+
+void ParticleFilter::resample(double resample_below) {
+  if (effective_share_ < resample_below) drawByWeight(poses_.size());
 }
 
 void ParticleFilter::anneal(const BatchScorer& scorer, double survival, double spread) {
   score(scorer);
   // The power that leaves the wanted share effective (Deutscher and Reid 2005, section 4.2).
-  normalizeWeights(powerFor(survival));
-  resample(1.01);
+  computeWeights(powerFor(survival));
+  drawByWeight(thinned(poses_.size()));
 
   // Spread by the deviation of the survivors, about one of them.
   const ParticlePose reference = poses_[poses_.size() / 2];
@@ -212,7 +237,7 @@ void ParticleFilter::anneal(const BatchScorer& scorer, double survival, double s
 
 void ParticleFilter::weigh(const BatchScorer& scorer) {
   score(scorer);
-  normalizeWeights(1.0);
+  computeWeights(1.0);
 }
 
 }  // namespace leap_object_tracker

@@ -348,7 +348,7 @@ class Tracker::Impl {
       filter_.anneal(scorer(Sharpness::kBlunt), 0.2, 0.4);
     filter_.weigh(scorer(Sharpness::kSharp));
     report_.effective_share = filter_.effectiveShare();
-    report_.particles = static_cast<int>(filter_.poses().size());
+    report_.particles = filter_.count();
   }
 
   /// Refines the prediction and the best particles that differ from each other; the one that

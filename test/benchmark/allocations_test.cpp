@@ -5,8 +5,11 @@
 #include <atomic>
 #include <cerrno>
 #include <cstddef>
+#include <opencv2/features2d.hpp>
 
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
+#include "leap_object_tracker/tracking/edge_field.hpp"
+#include "leap_object_tracker/tracking/feature_measurement.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/tracker.hpp"
 #include "recording.hpp"
@@ -112,24 +115,66 @@ TEST(Allocations, doNotHappenInTheParticleFilter) {
   });
 }
 
-TEST(Allocations, ofAWholeFrameAreFewAndDoNotGrow) {
+TEST(Allocations, doNotHappenInEdgesAndGainMaps) {
+  const Observation seen(frames());
+  const cv::Mat& image = frames().rectified[0].left;
+  EdgeField field;
+  GainMap map;
+  tbb::task_arena arena(1);
+  arena.execute([&] {
+    EXPECT_EQ(allocationsOf([&](int) { field.build(image, seen.regions()[0]); }), 0);
+    EXPECT_EQ(allocationsOf([&](int) { field.transform({1.2F, 3.0F}, 1, map); }), 0);
+  });
+}
+
+const Recording& cylinder() { return recording("x10_cylinder_textured", "640x240", 10); }
+
+TEST(Allocations, ofFeaturesAreThoseOfFast) {
+  const Observation seen(cylinder());
+  const RectifiedStereoFrame& frame = cylinder().rectified[0];
+  const Pose& pose = cylinder().camera_from_object[0];
+  FeatureMeasurement measurement(FeatureParams(), cylinder().object, cylinder().camera);
+  const auto poses = seen.particles(1000);
+  std::vector<float> scores(poses.size());
+  tbb::task_arena arena(1);
+  arena.execute([&] {
+    std::vector<cv::KeyPoint> found;
+    const double of_fast = allocationsOf([&](int) { cv::FAST(frame.left, found, 10, true); });
+    const auto observe = [&](int) { measurement.observe(frame, seen.regions(), pose, 0.0005); };
+    EXPECT_LE(allocationsOf(observe), 2 * of_fast);
+    EXPECT_EQ(allocationsOf([&](int) {
+                measurement.score(poses.data(), poses.size(), scores.data());
+                measurement.refine({pose, 1e6 * Matrix6d::Identity()});
+              }),
+              0);
+    EXPECT_EQ(allocationsOf([&](int) { measurement.learn(pose, 0.0002, 0.002); }), 0);
+  });
+}
+
+/// Of a tracked frame, after frames enough to settle.
+double allocationsOfAFrame(const Recording& recording, Measurement measurement) {
   TrackerParams params;
-  params.measurement = Measurement::kContour;
+  params.measurement = measurement;
   params.threads = 1;
-  Tracker tracker(params, frames().object, frames().camera);
-  tracker.start(frames().camera_from_object[0]);
-  const Stamp::duration period = frames().raw[1].stamp - frames().raw[0].stamp;
-  RectifiedStereoFrame frame = frames().rectified[0];
+  Tracker tracker(params, recording.object, recording.camera);
+  tracker.start(recording.camera_from_object[0]);
+  const Stamp::duration period = recording.raw[1].stamp - recording.raw[0].stamp;
+  RectifiedStereoFrame frame = recording.rectified[0];
   const auto track = [&](int) {
     frame.stamp += period;
     ASSERT_TRUE(tracker.track(frame));
   };
   const double first = allocationsOf(track), later = allocationsOf(track);
-  RecordProperty("allocations a frame", std::to_string(later));
-  std::printf("allocations a frame: %.1f\n", later);
   EXPECT_LE(later, first + 1);
-  // OpenCV's filters and Canny's queues keep no memory between calls, nor does the refinement.
-  EXPECT_LT(later, 300);
+  return later;
+}
+
+TEST(Allocations, ofAWholeFrameAreFewAndDoNotGrow) {
+  const double contour = allocationsOfAFrame(frames(), Measurement::kContour);
+  const double features = allocationsOfAFrame(cylinder(), Measurement::kBoth);
+  std::printf("allocations a frame: %.1f, with features %.1f\n", contour, features);
+  EXPECT_LE(contour, 8);    // lists of hypotheses
+  EXPECT_LE(features, 32);  // and cv::FAST
 }
 
 }  // namespace

@@ -1,9 +1,11 @@
 // Every stage of a frame by itself: rectification, edges, gain maps, prediction, annealing,
-// resampling, refinement, search.
+// resampling, refinement, features, search.
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
+#include "leap_object_tracker/tracking/contour_measurement.hpp"
+#include "leap_object_tracker/tracking/feature_measurement.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/pose_search.hpp"
@@ -125,12 +127,14 @@ void injection(benchmark::State& state) {
   });
 }
 
-/// Likelihoods that cost nothing: what is left is weights, resampling and spreading.
-void annealing(benchmark::State& state) {
+/// Likelihoods that cost nothing: what is left is weights, resampling and spreading, and the
+/// prediction that makes a thinned set whole again.
+void predictionAndAnnealing(benchmark::State& state) {
   Filtering filtering(state);
   const Pose truth = cube().camera_from_object.front();
   const float x = static_cast<float>(truth.translation().x());
   filtering.time(state, [&] {
+    filtering.filter().predict({}, 0.0087, Pose::Identity());
     filtering.filter().anneal(
         [x](const ParticlePose* poses, std::size_t count, float* scores) {
           for (std::size_t i = 0; i < count; ++i) {
@@ -157,7 +161,8 @@ void weighing(benchmark::State& state) {
 
 const bool registered = [] {
   for (const auto& [name, stage] :
-       {std::make_pair("prediction", prediction), std::make_pair("annealing", annealing),
+       {std::make_pair("prediction", prediction),
+        std::make_pair("predictionAndAnnealing", predictionAndAnnealing),
         std::make_pair("resampling", resampling), std::make_pair("injection", injection),
         std::make_pair("weighing", weighing)})
     benchmark::RegisterBenchmark(name, stage)
@@ -192,6 +197,65 @@ void exactView(benchmark::State& state) {
   timeEach(state, [&] { benchmark::DoNotOptimize(model.exactView(eye)); });
 }
 BENCHMARK(exactView)->UseManualTime();
+
+/// Features of a textured cylinder, with landmarks learnt from the frame itself.
+class Features {
+ public:
+  explicit Features(int threads)
+      : seen_(cylinder()),
+        measurement_(FeatureParams(), cylinder().object, cylinder().camera),
+        arena_(threads) {
+    observe();
+    for (int i = 0; i < 10; ++i) {
+      measurement_.learn(pose(), 0.0002, 0.002);
+      measurement_.expect(pose(), 0.0005);
+    }
+  }
+
+  void observe() {
+    arena_.execute([&] {
+      measurement_.observe(cylinder().rectified.front(), seen_.regions(), pose(), 0.0005);
+    });
+  }
+  const FeatureMeasurement& measurement() const { return measurement_; }
+  std::vector<ParticlePose> particles(int count) const {
+    return seen_.particles(static_cast<std::size_t>(count));
+  }
+
+ private:
+  static const Recording& cylinder() {
+    return recording("x10_cylinder_textured", "640x240", kFrames);
+  }
+  static const Pose& pose() { return cylinder().camera_from_object.front(); }
+
+  Observation seen_;
+  FeatureMeasurement measurement_;
+  tbb::task_arena arena_;
+};
+
+void featureExtraction(benchmark::State& state) {
+  Features features(static_cast<int>(state.range(0)));
+  timeEach(state, [&] { features.observe(); });
+  state.counters["features"] = static_cast<double>(features.measurement().features().size());
+}
+BENCHMARK(featureExtraction)->ArgName("threads")->Arg(1)->Arg(2)->UseManualTime();
+
+void featureScoring(benchmark::State& state) {
+  const Features features(1);
+  const auto poses = features.particles(static_cast<int>(state.range(0)));
+  std::vector<float> scores(poses.size());
+  timeEach(state, [&] { features.measurement().score(poses.data(), poses.size(), scores.data()); });
+}
+BENCHMARK(featureScoring)->ArgName("particles")->Arg(1000)->UseManualTime();
+
+void featureRefinement(benchmark::State& state) {
+  const Features features(1);
+  PosePrior prior;
+  prior.mean = toPose(features.particles(1).front());
+  prior.information = 1e6 * Matrix6d::Identity();
+  timeEach(state, [&] { benchmark::DoNotOptimize(features.measurement().refine(prior)); });
+}
+BENCHMARK(featureRefinement)->UseManualTime();
 
 void search(benchmark::State& state) {
   TrackerParams params;

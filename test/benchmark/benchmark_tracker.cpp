@@ -72,6 +72,11 @@ const bool registered = [] {
              Measurement::kContour,
              {1000, 10000, 100000}},
         Case{"wholeFrame/cube_640x480", "x10_cube_textured", "640x480", Measurement::kAuto, {1000}},
+        Case{"wholeFrame/cylinder_640x240",
+             "x10_cylinder_textured",
+             "640x240",
+             Measurement::kAuto,
+             {1000}},
         Case{"wholeFrame/mug_640x240", "wobble_mug", "640x240", Measurement::kAuto, {1000}}})
     benchmark::RegisterBenchmark(one.name, wholeFrame, one.scene, one.mode, one.measurement)
         ->ArgNames({"particles", "threads"})

@@ -5,6 +5,7 @@
 #include <valgrind/callgrind.h>
 
 #include "leap_object_tracker/rectification/stereo_rectifier.hpp"
+#include "leap_object_tracker/tracking/feature_measurement.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/pose_search.hpp"
@@ -23,6 +24,35 @@ void count(const char* name, const Stage& stage) {
   CALLGRIND_STOP_INSTRUMENTATION;
   CALLGRIND_DUMP_STATS_AT(name);
   CALLGRIND_ZERO_STATS;
+}
+
+/// With landmarks learnt from the frame itself.
+void countFeatures() {
+  const Recording& frames = recording("x10_cylinder_textured", "640x240", 3);
+  const Observation seen(frames);
+  const Pose& pose = frames.camera_from_object[0];
+  FeatureMeasurement measurement(FeatureParams(), frames.object, frames.camera);
+  count("features of a frame", [&] {
+    measurement.observe(frames.rectified[0], seen.regions(), pose, 0.0005);
+    measurement.learn(pose, 0.0002, 0.002);
+  });
+  const auto poses = seen.particles(1000);
+  std::vector<float> scores(poses.size());
+  count("feature scores, 1000 particles",
+        [&] { measurement.score(poses.data(), poses.size(), scores.data()); });
+}
+
+void countTracker(const char* name, const Recording& frames) {
+  TrackerParams params;
+  params.threads = 1;
+  Tracker tracker(params, frames.object, frames.camera);
+  tracker.start(frames.camera_from_object[0]);
+  RectifiedStereoFrame next = frames.rectified[0];
+  const Stamp::duration period = frames.raw[1].stamp - frames.raw[0].stamp;
+  count(name, [&] {
+    tracker.track(next);
+    next.stamp += period;
+  });
 }
 
 void countAll() {
@@ -71,16 +101,10 @@ void countAll() {
   PoseSearch search(TrackerParams(), frames.object, model, frames.camera);
   count("search", [&] { search.find(frames.rectified[0], std::nullopt); });
 
-  TrackerParams params;
-  params.threads = 1;
-  Tracker tracker(params, frames.object, frames.camera);
-  tracker.start(frames.camera_from_object[0]);
-  RectifiedStereoFrame next = frames.rectified[0];
-  const Stamp::duration period = frames.raw[1].stamp - frames.raw[0].stamp;
-  count("tracker, 1000 particles", [&] {
-    tracker.track(next);
-    next.stamp += period;
-  });
+  countFeatures();
+  countTracker("tracker, 1000 particles", frames);
+  countTracker("tracker with features, 1000 particles",
+               recording("x10_cylinder_textured", "640x240", 3));
 }
 
 }  // namespace

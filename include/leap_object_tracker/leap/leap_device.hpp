@@ -26,6 +26,7 @@ struct LeapFrame {
   FrameMetadata metadata;
   LeapControls taken_with;      ///< settings in force during the exposure
   std::uint32_t device_ms = 0;  ///< clock of the device [ms]
+  double transport = 0;         ///< [s] from the stamp until the last byte was there
 };
 
 /// What a device says of itself.
@@ -85,6 +86,7 @@ class LeapDevice {
   struct WaitingFrame {
     AssembledFrame frame;
     double begin = 0;  ///< [s] arrival without delays, on the steady clock
+    double end = 0;    ///< [s] arrival of the last payload, on the same
   };
 
   std::vector<std::uint8_t> readMemory(int first, int count, std::chrono::milliseconds pause);

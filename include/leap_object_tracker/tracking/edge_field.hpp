@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "leap_object_tracker/tracking/edge_detector.hpp"
+
 namespace leap_object_tracker {
 
 /// How well an edge explains a contour point at a distance: a truncated quadratic of the distance
@@ -56,8 +58,6 @@ class EdgeField {
   const cv::Mat& image() const { return image_; }
   /// Smoothed grey values of the region, 16 times the 8-bit scale (CV_16SC1).
   const cv::Mat& smooth() const { return smooth_; }
-  /// Canny edges of the region: 255 on edges (CV_8UC1).
-  const cv::Mat& edges() const { return edges_; }
 
   /// One edge pixel, in pixels of the whole image.
   struct Edgel {
@@ -74,7 +74,9 @@ class EdgeField {
  private:
   cv::Rect region_;
   cv::Size image_size_;
-  cv::Mat image_, padded_, smooth_, stabilized_, du_, dv_, edges_;
+  cv::Mat image_, smooth_;
+  ImageMemory<std::int16_t> smooth_memory_;
+  EdgeDetector detector_;
   std::vector<Edgel> edgels_;
   std::array<float, 256> slope_noise_{};
 };

@@ -22,6 +22,10 @@ class SignedDistance {
   /// @param gradient unit vector away from the body
   float operator()(const Eigen::Vector3f& point_in_object, Eigen::Vector3f& gradient) const;
 
+  Shape shape() const { return shape_; }
+  /// [m] Half of ObjectModel::size.
+  const Eigen::Vector3f& half() const { return half_; }
+
  private:
   void buildGrid(const Mesh& mesh);
   float gridDistance(const Eigen::Vector3f& point) const;

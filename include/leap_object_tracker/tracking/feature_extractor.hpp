@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/core/types.hpp>
 #include <vector>
@@ -16,6 +18,11 @@ namespace leap_object_tracker {
 using FeatureDescriptor = std::array<float, 64>;
 
 float squaredDistance(const FeatureDescriptor& a, const FeatureDescriptor& b);
+
+/// Of Haar wavelets along the columns and rows of an image, at one pixel [grey levels].
+struct WaveletResponse {
+  std::int16_t u = 0, v = 0;
+};
 
 /// A corner that both eyes see.
 struct StereoFeature {
@@ -75,6 +82,13 @@ class FeatureExtractor {
     cv::Mat taken;       ///< not zero where a corner is close by
     std::vector<cv::KeyPoint> found;
     std::vector<Corner> corners;
+    std::vector<WaveletResponse> responses;
+  };
+
+  /// The likest corners of the other eye.
+  struct Best {
+    float distance = std::numeric_limits<float>::infinity(), second = distance;  ///< squared
+    int index = -1;
   };
 
   void prepare(const cv::Mat& image, const cv::Rect& region, double zoom, double roll,
@@ -86,6 +100,7 @@ class FeatureExtractor {
   RectifiedStereoCamera camera_;
   CornerDetector detector_;
   std::array<EyeImage, 2> eyes_;
+  std::array<std::vector<Best>, 2> nearest_;  ///< of the corners of each eye
   std::vector<StereoFeature> features_;
   Counts counts_;
 };

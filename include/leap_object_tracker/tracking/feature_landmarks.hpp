@@ -32,8 +32,8 @@ class LandmarkMap {
   /// The landmark that each feature shows, or -1: near the place where a pose puts the feature,
   /// seen from a similar direction, of like descriptor, and no other nearly as like.
   /// @param reach [m] how far the place may be off
-  std::vector<int> match(const std::vector<StereoFeature>& features, const Pose& camera_from_object,
-                         double reach) const;
+  void match(const std::vector<StereoFeature>& features, const Pose& camera_from_object,
+             double reach, std::vector<int>& matches) const;
 
   /// How many landmarks, all seen a few times, a pose turns towards the eye.
   int expected(const Pose& camera_from_object) const;
@@ -69,6 +69,7 @@ class LandmarkMap {
 
   int capacity_;
   std::vector<Landmark> landmarks_;
+  std::vector<bool> seen_;  ///< in the frame that is learnt from
   std::vector<View> views_;
 };
 

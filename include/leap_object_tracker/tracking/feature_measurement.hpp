@@ -8,6 +8,7 @@
 #include "leap_object_tracker/geometry/object_model.hpp"
 #include "leap_object_tracker/tracking/feature_distance.hpp"
 #include "leap_object_tracker/tracking/feature_extractor.hpp"
+#include "leap_object_tracker/tracking/feature_kernel.hpp"
 #include "leap_object_tracker/tracking/feature_landmarks.hpp"
 #include "leap_object_tracker/tracking/feature_params.hpp"
 #include "leap_object_tracker/tracking/measurement_model.hpp"
@@ -71,7 +72,7 @@ class FeatureMeasurement {
   const LandmarkMap& landmarks() const { return landmarks_; }
 
  private:
-  /// A feature with what the batch scorer needs, in single precision.
+  /// A feature with what scoring needs, in single precision.
   struct Point {
     Eigen::Vector3f in_camera;
     float variance = 0;           ///< [m^2] along the ray from the eye
@@ -81,7 +82,6 @@ class FeatureMeasurement {
     float peak = 0;  ///< log density of a perfect match over that of an outlier
   };
   void makePoints();
-  float scoreOne(const ParticlePose& pose) const;
   Matrix6d mapCovariance(const Pose& camera_from_object) const;
 
   FeatureParams params_;
@@ -92,7 +92,9 @@ class FeatureMeasurement {
   LandmarkMap landmarks_;
   std::vector<StereoFeature> features_;
   std::vector<int> matches_;
+  std::vector<bool> on_surface_;
   std::vector<Point> points_;
+  FeatureArrays arrays_;  ///< the same for the scoring of many poses
 };
 
 }  // namespace leap_object_tracker

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "leap_object_tracker/geometry/pose.hpp"
@@ -15,6 +16,23 @@ namespace leap_object_tracker {
 /// Scores a batch of poses: log p(frame | pose) up to a constant.
 using BatchScorer =
     std::function<void(const ParticlePose* poses, std::size_t count, float* log_likelihood)>;
+
+/// Leaves new elements of a vector unwritten, which are written before they are read anyway.
+template <class T>
+struct UnwrittenAllocator : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = UnwrittenAllocator<U>;
+  };
+  template <class U>
+  void construct(U* /*place*/) noexcept {}
+  template <class U, class... Arguments>
+  void construct(U* place, Arguments&&... arguments) {
+    new (static_cast<void*>(place)) U(std::forward<Arguments>(arguments)...);
+  }
+};
+template <class T>
+using UnwrittenVector = std::vector<T, UnwrittenAllocator<T>>;
 
 /// Poses with velocities and weights. Knows nothing of images. Every random number depends on the
 /// seed, the frame and the particle only, so that the number of threads changes nothing.
@@ -32,7 +50,8 @@ class ParticleFilter {
 
   /// One annealing layer (Deutscher and Reid 2005): weights by the likelihood to the power that
   /// keeps `survival` of the particles effective, resamples systematically, and spreads them by
-  /// `spread` times the particles' own standard deviation.
+  /// `spread` times the particles' own standard deviation. Of large sets, whose survivors would
+  /// stand there many times over, it keeps a part (thinned()) until the next prediction.
   void anneal(const BatchScorer& score, double survival, double spread);
 
   /// Weights by the likelihood, full power. Particles stay where they are.
@@ -48,26 +67,37 @@ class ParticleFilter {
   /// Effective sample size / particles, after the last weigh().
   double effectiveShare() const { return effective_share_; }
 
-  const std::vector<ParticlePose>& poses() const { return poses_; }
+  const UnwrittenVector<ParticlePose>& poses() const { return poses_; }
+  /// Of the last scores; as many as poses().
   const std::vector<float>& logLikelihoods() const { return log_likelihoods_; }
-  /// Leaves particles out, or repeats some, evenly over the set.
-  void setCount(int particles);
+
+  /// From the next prediction on: particles are left out, or some repeated, evenly over the set.
+  void setCount(int particles) { wanted_ = static_cast<std::size_t>(particles); }
+  /// As set, however many of them a layer keeps.
+  int count() const { return static_cast<int>(wanted_); }
+
+  /// How many of so many particles go on after an annealing layer.
+  static std::size_t thinned(std::size_t particles);
 
  private:
+  void resize(std::size_t count);
   void score(const BatchScorer& scorer);
-  void normalizeWeights(double power);
+  void computeWeights(double power);
   double powerFor(double survival);
   void forgetWeights();
-  void drawIndices();
+  void drawByWeight(std::size_t count);
 
   FilterParams params_;
   std::uint64_t draw_ = 0;  ///< number of random draws of the whole set so far
-  std::vector<ParticlePose> poses_, spare_poses_;
-  std::vector<ParticleTwist> velocities_, spare_velocities_;
-  std::vector<float> log_likelihoods_, sample_, weights_;
-  std::vector<std::uint32_t> chosen_;
-  std::vector<TwistSums> twist_sums_;    ///< of pieces of the set
+  std::size_t wanted_ = 0;
+  UnwrittenVector<ParticlePose> poses_, spare_poses_;
+  UnwrittenVector<ParticleTwist> velocities_, spare_velocities_;
+  std::vector<float> log_likelihoods_, sample_;
+  std::vector<float> weights_;           ///< not normalised
+  std::vector<float> bests_;             ///< highest log-likelihoods of pieces of the set
+  std::vector<TwistSums> twist_sums_;    ///< of these pieces
   std::vector<WeightSums> weight_sums_;  ///< the same
+  std::vector<double> passed_;           ///< weight of all pieces before each
   double effective_share_ = 1;
 };
 

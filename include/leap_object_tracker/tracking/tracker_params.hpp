@@ -26,7 +26,7 @@ struct MotionParams {
 
 /// The particle set.
 struct FilterParams {
-  int particles = 1000;     ///< scored a frame and layer, at most
+  int particles = 1000;     ///< at most; above 10000, one of 4 goes on to the next layer
   int least_particles = 0;  ///< where the pose is well known; 0: always as many
   double budget_ms = 0;     ///< [ms] for a frame: fewer particles if it takes longer; 0: no limit
   int layers = 2;           ///< annealing layers, from blunt to sharp likelihood
