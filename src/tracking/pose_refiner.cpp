@@ -27,6 +27,9 @@ constexpr double kOutlineSpread = 0.8, kCreaseSpread = 1.3;  // [px]
 // Against chance [nats]: an edge near an arbitrary place is seen about every third time, an outline
 // nearly always, a crease often not.
 constexpr double kMissedOutline = 1.5, kMissedCrease = 0.4;
+// [px] that are searched however close the next line is: to move a pose, and to judge it, for which
+// it does not matter which of the two an edge belongs to.
+constexpr double kCrowdedRange = 0.75, kCrowdedReach = 1.6;
 constexpr double kSureContrast = 0.25;  // of the brightest, that an edge shows without fail
 constexpr double kFine = 2.6;           // [px] ranges below this are searched by fitted steps
 constexpr int kProfile = 7;             // [px] half length of a profile that steps are fitted to
@@ -131,7 +134,8 @@ struct PoseRefiner::Match {
   bool outline = false;
   bool limb = false;
   bool bright_inside = false;
-  double noise = 0;  ///< [grey levels] that the fitted step left; zero: none was fitted
+  double crowding = 0;  ///< [px] by which lines that blur together may move an edge
+  double noise = 0;     ///< [grey levels] that the fitted step left; zero: none was fitted
   /// Contrast that is to be expected, 1 enough to be seen, 0 none: for what is not seen to count.
   double expected = 1;
   float region = 0;  ///< [nats/px] by which the grey values speak for an outline here
@@ -171,8 +175,8 @@ PoseRefiner::PoseRefiner(const ContourParams& params, const RectifiedStereoCamer
 
 void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                         const Pose& pose, const std::array<ContourView, 2>* exact, double range,
-                        const Appearance& appearance, bool fine, std::vector<Match>& matches,
-                        std::array<EyeSupport, 2>& eyes) const {
+                        const Appearance& appearance, bool fine, double crowded_range,
+                        std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const {
   matches.clear();
   const double focal = camera_.focal_length;
   std::array<float, 2 * (kLongestRange + kRegionReach) + 5> profile{};
@@ -245,7 +249,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       const float fu = match.place.x(), fv = match.place.y();
       const float nu = match.normal.x(), nv = match.normal.y();
       const float clearance = match.clearance;
-      const double own_range = std::min(range, std::max(0.75, 0.5 * clearance));
+      const double own_range = std::min(range, std::max(crowded_range, 0.5 * clearance));
       const int reach = std::min(kLongestRange, static_cast<int>(std::ceil(own_range)));
 
       // Grey values along the normal; the part inside the region only.
@@ -286,7 +290,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         if (region) match.region = regionAt(0);
         float best = 0;
         // Lines closer than the blur of the image pull each other's edges.
-        const double crowding = std::max(0.0, 0.25 * (4.0 - clearance));
+        match.crowding = std::max(0.0, 0.25 * (4.0 - clearance));
         const float blur = static_cast<float>(std::max(1.0, 0.5 * own_range));
         for (int k = std::max(low + 2, -reach); k <= std::min(high - 2, reach); ++k) {
           const float here = slope(k), size = std::abs(here);
@@ -315,7 +319,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           match.offset = place;
           match.bright_inside = brighter_inside;
           match.variance = params_.edge_sigma * params_.edge_sigma + std::pow(weakest / size, 2) +
-                           std::pow(crowding, 2) +
+                           std::pow(match.crowding, 2) +
                            (match.outline ? 0.0 : kCreaseDoubt * kCreaseDoubt);
         }
         if (match.found) {
@@ -388,7 +392,8 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   };
 
   for (const double range : ranges) {
-    match(model, fields, pose, exact, range, appearance, range < kFine, matches, result.eyes);
+    match(model, fields, pose, exact, range, appearance, range < kFine, kCrowdedRange, matches,
+          result.eyes);
     const double deviation = robustScale(range);
     const double limit = std::min(range + 1, 4.685 * std::max(deviation, params_.edge_sigma));
     // Edges that lie farther off than their noise says share a wrong pose, not wrong edges.
@@ -415,7 +420,8 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   }
 
   const double last_range = 2.5;
-  match(model, fields, pose, exact, last_range, appearance, true, matches, result.eyes);
+  match(model, fields, pose, exact, last_range, appearance, true, kCrowdedReach, matches,
+        result.eyes);
   const double deviation = robustScale(last_range);
   result.residual = deviation;
   double bright = 0, judged = 0;
@@ -430,17 +436,18 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
         judged += m.length;
         if (m.bright_inside) bright += m.length;
       }
-      gain = std::max(
-          gain, 1 - 0.5 * std::pow(m.offset / (m.outline ? kOutlineSpread : kCreaseSpread), 2));
+      const double spread = std::hypot(m.outline ? kOutlineSpread : kCreaseSpread, m.crowding);
+      gain = std::max(gain, 1 - 0.5 * std::pow(m.offset / spread, 2));
     }
     result.log_likelihood +=
         m.samples * gain + kRegionWeight * m.expected * m.samples * static_cast<double>(m.region);
   }
   result.evidence = result.log_likelihood;
   // Lines that the model lacks or has too many spoil the fits; points without a fit do not count.
+  // It is the outline that weighs them: poses that show more creases are not worse for it.
   double misfit = 0, fitted = 0, all = 0;
   for (const Match& m : matches) {
-    all += m.expected * m.samples;
+    if (m.outline) all += m.expected * m.samples;
     if (m.noise <= 0) continue;
     fitted += m.samples;
     misfit += m.samples * std::log(std::clamp(m.noise, 1.0, 20.0));
@@ -454,7 +461,7 @@ void PoseRefiner::learn(const ContourModel& model, const std::array<EdgeField, 2
                         const Pose& pose, Appearance& appearance) const {
   thread_local std::vector<Match> matches;
   std::array<EyeSupport, 2> eyes;
-  match(model, fields, pose, nullptr, 2.0, appearance, false, matches, eyes);
+  match(model, fields, pose, nullptr, 2.0, appearance, false, kCrowdedRange, matches, eyes);
   GreyModel::Histogram inside{}, outside{};
   double bright = 0, judged = 0;
   for (const Match& m : matches) {

@@ -72,7 +72,8 @@ class PoseRefiner {
   static void findClearances(std::size_t first, std::vector<Match>& matches);
   void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
              const std::array<ContourView, 2>* exact, double range, const Appearance& appearance,
-             bool fine, std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const;
+             bool fine, double crowded_range, std::vector<Match>& matches,
+             std::array<EyeSupport, 2>& eyes) const;
   template <class Image>
   void fit(const Image& image, Match& match) const;
 
