@@ -209,13 +209,16 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       if (at.z() < kNearest) continue;
       const double scale = focal / at.z(), x = at.x() / at.z(), y = at.y() / at.z();
       const double u = camera_.center_u + focal * x, v = camera_.center_v + focal * y;
-      // Off the image nothing is known.
-      if (u < 1 || v < 1 || u > camera_.size.width - 3 || v > camera_.size.height - 3) continue;
       const Eigen::Vector3d along = rotation * point.tangent.cast<double>();
       const Eigen::Vector2d tangent(scale * (along.x() - x * along.z()),
                                     scale * (along.y() - y * along.z()));
       const double stretch = tangent.norm();
       if (stretch * point.length < 0.02) continue;  // seen end on
+      auto& support = eyes[static_cast<std::size_t>(eye)];
+      support.whole += stretch * point.length;
+      // Off the image nothing is known.
+      if (u < 1 || v < 1 || u > camera_.size.width - 3 || v > camera_.size.height - 3) continue;
+      support.inside += stretch * point.length;
       Eigen::Vector2d normal(-tangent.y() / stretch, tangent.x() / stretch);
       Match match;
       match.eye = eye;

@@ -34,6 +34,7 @@ constexpr int kRounds = 4;
 constexpr std::size_t kRefinedAtLikely = 8;
 constexpr std::size_t kRefinedElsewhere = 2;
 constexpr std::size_t kPromising = 16;         // poses that are refined to the end
+constexpr std::size_t kAsked = 3;              // places whose best pose is offered
 constexpr std::size_t kExactlySeen = 8;        // of the turned poses that are compared at last
 constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 // Of the best score that so much contour could have: less speaks against a pose. Without it, views
@@ -350,7 +351,8 @@ std::vector<Pose> PoseSearch::turned(const Pose& camera_from_object) const {
 }
 
 std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
-                                            const std::optional<Pose>& near) {
+                                            const std::optional<Pose>& near,
+                                            const std::function<bool(const RefinedPose&)>& accept) {
   ++calls_;
   const cv::Rect whole(cv::Point(), camera_.size);
   tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
@@ -364,25 +366,6 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
 
   const std::vector<Place> places = findPlaces(frame);
   std::vector<Hypothesis> kept;
-  // Best first, none of them within `apart` [rad] of a better one.
-  const auto keepDistinct = [&](std::vector<Hypothesis>& all, std::size_t count, double apart) {
-    const std::size_t looked_at = std::min(12 * count, all.size());
-    std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(looked_at), all.end(),
-                      [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
-    std::vector<Hypothesis> distinct;
-    std::vector<Pose> poses;
-    for (std::size_t i = 0; i < looked_at && distinct.size() < count; ++i) {
-      const Pose pose = toPose(all[i].pose);
-      const bool known = std::any_of(poses.begin(), poses.end(), [&](const Pose& other) {
-        return (pose.translation() - other.translation()).norm() < apart * model_->radius() &&
-               angleBetween(pose.linear(), other.linear(), symmetry_) < apart;
-      });
-      if (known) continue;
-      poses.push_back(pose);
-      distinct.push_back(all[i]);
-    }
-    all = std::move(distinct);
-  };
   std::vector<Hypothesis> hypotheses;
   for (std::size_t index = 0; index < places.size(); ++index) {
     const Eigen::Vector3d& place = places[index].point;
@@ -398,8 +381,9 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       hypotheses.push_back({toParticlePose(fitted.value_or(pose)), 0, index});
     }
     scoreAll(hypotheses, kCoarsePoints, mapsFor(place.z(), 1), places);
-    keepDistinct(hypotheses, index < kLikelyPlaces ? kKeptAtLikely : kKeptElsewhere, 0.2);
-    kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
+    for (const Hypothesis& hypothesis :
+         distinct(hypotheses, index < kLikelyPlaces ? kKeptAtLikely : kKeptElsewhere, 0.2))
+      kept.push_back(hypothesis);
   }
   if (near) {
     hypotheses.clear();
@@ -414,8 +398,8 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       hypotheses.push_back({toParticlePose(movedInCamera(*near, step)), 0, places.size()});
     }
     scoreAll(hypotheses, kCoarsePoints, mapsFor(std::max(0.03, near->translation().z())), places);
-    keepDistinct(hypotheses, kKeptAtLikely, 0.1);
-    kept.insert(kept.end(), hypotheses.begin(), hypotheses.end());
+    for (const Hypothesis& hypothesis : distinct(hypotheses, kKeptAtLikely, 0.1))
+      kept.push_back(hypothesis);
   }
   if (kept.empty()) return std::nullopt;
 
@@ -453,8 +437,9 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     while (last < kept.size() && kept[last].place == kept[first].place) ++last;
     std::vector<Hypothesis> here(kept.begin() + static_cast<std::ptrdiff_t>(first),
                                  kept.begin() + static_cast<std::ptrdiff_t>(last));
-    keepDistinct(here, here.size() > kKeptElsewhere ? kRefinedAtLikely : kRefinedElsewhere, 0.3);
-    for (const Hypothesis& hypothesis : here) starts.push_back(toPose(hypothesis.pose));
+    for (const Hypothesis& hypothesis :
+         distinct(here, here.size() > kKeptElsewhere ? kRefinedAtLikely : kRefinedElsewhere, 0.3))
+      starts.push_back(toPose(hypothesis.pose));
     first = last;
   }
   std::vector<RefinedPose> refined(starts.size());
@@ -472,29 +457,72 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     refined[i] =
         refiner_.refine(*model_, fields_, refined[i].camera_from_object, {}, {}, {4, 3, 2.5});
   });
-  auto best = std::max_element(refined.begin(), refined.end(), less);
-  // A body that looks nearly the same turned over or round may have been taken for it.
-  const RefinedPose first = *best;
-  const double first_depth = std::max(0.03, first.camera_from_object.translation().z());
-  hypotheses.clear();
-  for (const Pose& pose : turned(first.camera_from_object))
-    hypotheses.push_back({toParticlePose(pose), 0, places.size()});
-  scoreAll(hypotheses, model_->points(), mapsFor(first_depth, 2), places);
-  keepDistinct(hypotheses, kTurned, 0.15);
-  starts.clear();
-  for (const Hypothesis& hypothesis : hypotheses) starts.push_back(toPose(hypothesis.pose));
-  starts.push_back(first.camera_from_object);
-  refined.resize(starts.size());
-  // What is object and what is not, each says for itself.
+  std::sort(refined.begin(), refined.end(),
+            [&](const auto& a, const auto& b) { return less(b, a); });
+  std::optional<RefinedPose> best;
+  std::vector<Eigen::Vector3d> asked;
+  for (const RefinedPose& candidate : refined) {
+    const Eigen::Vector3d place = candidate.camera_from_object.translation();
+    if (std::any_of(asked.begin(), asked.end(), [&](const Eigen::Vector3d& other) {
+          return (place - other).norm() < model_->radius();
+        }))
+      continue;
+    asked.push_back(place);
+    const RefinedPose settled = bestTurned(candidate);
+    const double depth = settled.camera_from_object.translation().z();
+    if (depth < params_.volume.nearest || depth > params_.volume.farthest) continue;
+    if (accept(settled)) return settled;
+    if (!best) best = settled;
+    if (asked.size() >= kAsked) break;
+  }
+  return best;
+}
+
+/// Best first, none of them within `apart` [rad] of a better one.
+std::vector<PoseSearch::Hypothesis> PoseSearch::distinct(std::vector<Hypothesis>& hypotheses,
+                                                         std::size_t count, double apart) const {
+  const std::size_t looked_at = std::min(12 * count, hypotheses.size());
+  std::partial_sort(hypotheses.begin(), hypotheses.begin() + static_cast<std::ptrdiff_t>(looked_at),
+                    hypotheses.end(),
+                    [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
+  std::vector<Hypothesis> kept;
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < looked_at && kept.size() < count; ++i) {
+    const Pose pose = toPose(hypotheses[i].pose);
+    const bool known = std::any_of(poses.begin(), poses.end(), [&](const Pose& other) {
+      return (pose.translation() - other.translation()).norm() < apart * model_->radius() &&
+             angleBetween(pose.linear(), other.linear(), symmetry_) < apart;
+    });
+    if (known) continue;
+    poses.push_back(pose);
+    kept.push_back(hypotheses[i]);
+  }
+  return kept;
+}
+
+/// A body that looks nearly the same turned over or round may have been taken for it: the best of
+/// the pose and its turned ones.
+RefinedPose PoseSearch::bestTurned(const RefinedPose& pose) const {
+  std::vector<Hypothesis> hypotheses;
+  for (const Pose& other : turned(pose.camera_from_object))
+    hypotheses.push_back({toParticlePose(other), 0, 0});
+  const double depth = std::max(0.03, pose.camera_from_object.translation().z());
+  scoreAll(hypotheses, model_->points(), mapsFor(depth, 2), {});
+  std::vector<Pose> starts;
+  for (const Hypothesis& hypothesis : distinct(hypotheses, kTurned, 0.15))
+    starts.push_back(toPose(hypothesis.pose));
+  starts.push_back(pose.camera_from_object);
+  std::vector<RefinedPose> refined(starts.size());
   std::vector<Appearance> looks(starts.size());
-  std::vector<std::size_t> order(starts.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
     refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 7, 4});
+    // What is object and what is not, each says for itself.
     refiner_.learn(*model_, fields_, refined[i].camera_from_object, looks[i]);
     refined[i] =
         refiner_.refine(*model_, fields_, refined[i].camera_from_object, {}, looks[i], {3, 2.5});
   });
+  std::vector<std::size_t> order(starts.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
   const auto likelier = [&](std::size_t a, std::size_t b) {
     return refined[a].log_likelihood > refined[b].log_likelihood;
   };
@@ -506,11 +534,16 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     refineExactly(refiner_, *model_, fields_, camera_.baseline, {}, looks[order[i]],
                   refined[order[i]]);
   });
-  best = refined.begin() +
-         static_cast<std::ptrdiff_t>(*std::min_element(order.begin(), order.end(), likelier));
-  const double depth = best->camera_from_object.translation().z();
-  if (depth < params_.volume.nearest || depth > params_.volume.farthest) return std::nullopt;
-  return *best;
+  return refined[*std::min_element(order.begin(), order.end(), likelier)];
+}
+
+RefinedPose PoseSearch::judge(const Pose& camera_from_object) const {
+  Appearance looks;
+  refiner_.learn(*model_, fields_, camera_from_object, looks);
+  RefinedPose refined =
+      refiner_.refine(*model_, fields_, camera_from_object, {}, looks, {4, 3, 2.5});
+  refineExactly(refiner_, *model_, fields_, camera_.baseline, {}, looks, refined);
+  return refined;
 }
 
 }  // namespace leap_object_tracker

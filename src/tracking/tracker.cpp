@@ -48,9 +48,17 @@ constexpr double kApart = 0.25;                   // [rad]
 constexpr double kTrustedLandmarks = 0.5;  // share of landmarks that make turned poses needless
 constexpr double kExact = 0.5;             // [px]
 constexpr int kPatience = 3;               // frames below it before the object counts as lost
-constexpr double kFoundSupport = 0.6;      // share of the contour that a found pose must have
-constexpr double kLandmarkSupport = 0.6;   // FeatureTracking::support to stand by a pose
-constexpr float kOutsideVolume = 1000;     // [nats] against a pose outside the working volume
+constexpr double kFoundSupport = 0.68;     // share of the contour that a found pose must have
+constexpr double kRefoundSupport = 0.6;    // the same, close to where the object was last
+constexpr double kRefoundReach = 0.03;     // [m]
+constexpr double kFoundInside = 0.55;      // share of the contour inside the images
+constexpr double kSureSupport = 0.7;       // below it the search is asked for its opinion
+constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
+constexpr double kOpinionMargin = 20;                // [nats] by which another pose must be better
+constexpr double kOpinionSupport = 0.15;             // and have more support
+constexpr double kLostSpread = 0.005;     // [m] of a pose without support that is given up at once
+constexpr double kLandmarkSupport = 0.6;  // FeatureTracking::support to stand by a pose
+constexpr float kOutsideVolume = 1000;    // [nats] against a pose outside the working volume
 constexpr int kNearFrames = 30;  // for which a lost object is looked for near its last pose
 constexpr double kRecallPositionSigma = 0.01;  // [m]
 constexpr double kRecallRotationSigma = 0.3;   // [rad]
@@ -176,6 +184,7 @@ class Tracker::Impl {
     const RefinedPose refined = features_.alone() ? refineByFeatures() : refineBest();
     takeOver(refined);
     if (report_.state == TrackerState::kTracking && weak_frames_ == 0) considerTurned();
+    if (report_.state == TrackerState::kTracking) askForSecondOpinion(frame);
     report_.filter_ms = millisecondsSince(started);
     budget_.record(report_.particles, particles_ms, millisecondsSince(begun) - particles_ms);
 
@@ -196,23 +205,69 @@ class Tracker::Impl {
       report_.search_ms = millisecondsSince(started);
       return;
     }
-    const std::optional<RefinedPose> found = search_.find(frame, last_seen_);
+    std::optional<Pose> known;
+    const auto accept = [&](const RefinedPose& candidate) {
+      if (!goodStart(candidate)) return false;
+      const Pose pose = asLastSeen(candidate.camera_from_object);
+      const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
+      known = features_.absolute(frame, regions(belief), pose);
+      return known || !last_seen_ || !features_.refuse(pose);
+    };
+    bool accepted = false;
+    const std::optional<RefinedPose> found =
+        search_.find(frame, last_seen_,
+                     [&](const RefinedPose& candidate) { return accepted = accept(candidate); });
     report_.search_ms = millisecondsSince(started);
     report_.support = found ? found->support() : 0;
-    if (!found || report_.support < kFoundSupport) {
+    if (!accepted) {
       if (++frames_lost_ > kNearFrames)
         last_seen_.reset(), report_.state = TrackerState::kSearching;
       return;
     }
-    Pose pose = found->camera_from_object;
-    if (last_seen_) pose = nearestEquivalent(pose, *last_seen_, object_.symmetry);
-    const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
-    const std::optional<Pose> known = features_.absolute(frame, regions(belief), pose);
-    if (!known && last_seen_ && features_.refuse(pose)) return;
-    takeUp(known.value_or(pose), frame.stamp, known.has_value());
+    takeUp(known.value_or(asLastSeen(found->camera_from_object)), frame.stamp, known.has_value());
     tracked_frames_ = turned_votes_ = 0;
     appearance_ = {};
     appearance_.bright_inside = std::clamp(found->bright_inside, 0.3, 0.9);
+  }
+
+  /// Whether a pose that was searched for may be the object's.
+  bool goodStart(const RefinedPose& found) const {
+    const bool near =
+        last_seen_ &&
+        (found.camera_from_object.translation() - last_seen_->translation()).norm() < kRefoundReach;
+    return found.support() >= (near ? kRefoundSupport : kFoundSupport) &&
+           found.insideShare() >= kFoundInside;
+  }
+
+  Pose asLastSeen(const Pose& pose) const {
+    return last_seen_ ? nearestEquivalent(pose, *last_seen_, object_.symmetry) : pose;
+  }
+
+  /// While much of the contour is missing, something may hide the object, or it may be elsewhere:
+  /// the search tells, more and more seldom as long as it agrees.
+  void askForSecondOpinion(const RectifiedStereoFrame& frame) {
+    if (features_.alone() || report_.support >= kSureSupport) {
+      frames_to_opinion_ = opinion_period_ = kFirstOpinion;
+      return;
+    }
+    if (--frames_to_opinion_ > 0) return;
+    frames_to_opinion_ = opinion_period_ = std::min(2 * opinion_period_, kLastOpinion);
+    const auto started = Clock::now();
+    std::optional<RefinedPose> own;
+    bool better = false;
+    const std::optional<RefinedPose> found =
+        search_.find(frame, belief_.pose, [&](const RefinedPose& candidate) {
+          if (!own) own = search_.judge(belief_.pose);
+          better = goodStart(candidate) && candidate.support() > own->support() + kOpinionSupport &&
+                   candidate.log_likelihood > own->log_likelihood + kOpinionMargin &&
+                   !features_.refuse(candidate.camera_from_object);
+          return better;
+        });
+    report_.search_ms = millisecondsSince(started);
+    if (!better) return;
+    takeUp(asLastSeen(found->camera_from_object), frame.stamp, false);
+    report_.state = TrackerState::kLost;
+    frames_to_opinion_ = opinion_period_ = kFirstOpinion;
   }
 
   /// Looks for landmarks where the object was last, whatever hides its contour.
@@ -517,7 +572,9 @@ class Tracker::Impl {
       weak_frames_ = 0;
       last_seen_ = remembered_ = belief_.pose;
       report_.state = TrackerState::kTracking;
-    } else if (++weak_frames_ >= kPatience) {
+    } else if (++weak_frames_ >= kPatience ||
+               belief_.poseCovariance().topLeftCorner<3, 3>().diagonal().maxCoeff() >
+                   kLostSpread * kLostSpread) {
       report_.state = TrackerState::kLost;
       frames_lost_ = 0;
     }
@@ -544,6 +601,7 @@ class Tracker::Impl {
   Appearance appearance_;
   std::vector<std::uint32_t> order_;  ///< of the particles, the best ones first
   int weak_frames_ = 0;
+  int frames_to_opinion_ = kFirstOpinion, opinion_period_ = kFirstOpinion;
   int frames_lost_ = 0;
   bool fresh_ = false;
   bool confirming_ = false;         ///< the last search found something

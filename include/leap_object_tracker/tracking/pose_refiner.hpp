@@ -28,6 +28,8 @@ struct PosePrior {
 struct EyeSupport {
   double visible = 0;    ///< [px] length of the contour inside the image
   double supported = 0;  ///< [px] of it, with an edge of the right direction at the right place
+  double whole = 0;      ///< [px] length of the contour, inside the image or not
+  double inside = 0;     ///< [px] of it inside the image
 };
 
 struct RefinedPose {
@@ -42,6 +44,12 @@ struct RefinedPose {
   /// The same without regard to what the image shows besides [nats]: compares poses of different
   /// places.
   double evidence = 0;
+
+  /// Share of the contour that lies inside the images.
+  double insideShare() const {
+    const double whole = eyes[0].whole + eyes[1].whole;
+    return whole > 0 ? (eyes[0].inside + eyes[1].inside) / whole : 0;
+  }
 
   double support() const {
     const double visible = eyes[0].visible + eyes[1].visible;

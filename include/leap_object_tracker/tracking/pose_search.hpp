@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -29,9 +30,14 @@ class PoseSearch {
              const RectifiedStereoCamera& camera);
 
   /// @param near camera_from_object of a pose near which to look as well
-  /// @return the best pose found, whether good or not; nothing if no place looks like the object.
+  /// @param accept asked about the best pose of one place after the other, at most three
+  /// @return the first pose accepted, else the best one; nothing if no place looks like the object.
   std::optional<RefinedPose> find(const RectifiedStereoFrame& frame,
-                                  const std::optional<Pose>& near);
+                                  const std::optional<Pose>& near,
+                                  const std::function<bool(const RefinedPose&)>& accept);
+
+  /// A pose refined and judged on the last frame as those that find() compares.
+  RefinedPose judge(const Pose& camera_from_object) const;
 
   /// Poses at the same place in which the object looks nearly as at this one: turned over, or round
   /// its axes.
@@ -62,6 +68,9 @@ class PoseSearch {
                                bool extents) const;
   float hullDoubt(const Glance& seen, const BrightRegion& region) const;
   std::optional<Pose> fitToRegion(const Pose& pose, const Place& place) const;
+  std::vector<Hypothesis> distinct(std::vector<Hypothesis>& hypotheses, std::size_t count,
+                                   double apart) const;
+  RefinedPose bestTurned(const RefinedPose& pose) const;
   void scoreAll(std::vector<Hypothesis>& hypotheses, int points, const std::array<GainMap, 2>& maps,
                 const std::vector<Place>& places) const;
   const std::array<GainMap, 2>& mapsFor(double depth, int sharpening = 0) const;
