@@ -99,7 +99,9 @@ void countAll() {
     refiner.refine(model, seen.fields(), start, {}, Appearance(), {6, 4, 2.5});
   });
   PoseSearch search(TrackerParams(), frames.object, model, frames.camera);
-  count("search", [&] { search.find(frames.rectified[0], std::nullopt); });
+  count("search", [&] {
+    search.find(frames.rectified[0], std::nullopt, [](const RefinedPose&) { return true; });
+  });
 
   countFeatures();
   countTracker("tracker, 1000 particles", frames);
