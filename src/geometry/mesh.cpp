@@ -156,14 +156,15 @@ ShadowArea shadowAreaOf(const Mesh& mesh) {
   ShadowArea shadow;
   shadow.least = std::numeric_limits<double>::infinity();
   std::vector<bool> covered;
-  for (int i = 0; i < kDirections; ++i) {
-    const double z = 1 - (2 * i + 1.0) / kDirections, ring = std::sqrt(1 - z * z);
+  for (int i = -3; i < kDirections; ++i) {
+    // The axes first: along them bodies are often smallest or largest.
+    const double z = 1 - (2 * i + 1.0) / kDirections, ring = std::sqrt(std::max(0.0, 1 - z * z));
     const double angle = i * M_PI * (3 - std::sqrt(5.0));
+    const Eigen::Vector3d direction =
+        i < 0 ? Eigen::Vector3d::Unit(i + 3)
+              : Eigen::Vector3d(ring * std::cos(angle), ring * std::sin(angle), z);
     const Eigen::Matrix3d turn =
-        Eigen::Quaterniond::FromTwoVectors(
-            Eigen::Vector3d(ring * std::cos(angle), ring * std::sin(angle), z),
-            Eigen::Vector3d::UnitZ())
-            .toRotationMatrix();
+        Eigen::Quaterniond::FromTwoVectors(direction, Eigen::Vector3d::UnitZ()).toRotationMatrix();
     covered.assign((kCells + 1) * (kCells + 1), false);
     for (const auto& point : points) {
       const Eigen::Vector3d seen = turn * point;
@@ -184,7 +185,7 @@ ShadowArea shadowAreaOf(const Mesh& mesh) {
     const double area = inside * cell * cell;
     shadow.least = std::min(shadow.least, area);
     shadow.largest = std::max(shadow.largest, area);
-    shadow.mean += area / kDirections;
+    if (i >= 0) shadow.mean += area / kDirections;
   }
   return shadow;
 }

@@ -53,7 +53,12 @@ void addRegions(const cv::Mat& half, int closing, std::vector<BrightRegion>& reg
   // Regions that hardly shrink from one threshold to the next are links of one chain.
   std::vector<std::vector<BrightRegion>> open, still_open;
   const auto close = [&](std::vector<BrightRegion>& chain) {
-    BrightRegion middle = chain[chain.size() / 2];
+    // Half of the step from the dark to the dimmest part lies where the edge is, blurred or not.
+    const double half_way = 0.5 * chain.back().brightest;
+    BrightRegion middle = *std::min_element(
+        chain.begin(), chain.end(), [&](const BrightRegion& a, const BrightRegion& b) {
+          return std::abs(a.faintest - half_way) < std::abs(b.faintest - half_way);
+        });
     middle.faintest = chain.front().faintest;
     middle.brightest = chain.back().brightest;
     regions.push_back(middle);

@@ -33,9 +33,10 @@ constexpr int kChildren = 20;  // random steps of each, a round
 constexpr int kRounds = 4;
 constexpr std::size_t kRefinedAtLikely = 8;
 constexpr std::size_t kRefinedElsewhere = 2;
-constexpr std::size_t kPromising = 16;         // poses that are refined to the end
-constexpr std::size_t kAsked = 3;              // places whose best pose is offered
-constexpr std::size_t kExactlySeen = 8;        // of the turned poses that are compared at last
+constexpr std::size_t kPromising = 16;   // poses that are refined to the end
+constexpr double kReach = 0.2;           // of a pose's error, as a share of the object's radius
+constexpr std::size_t kAsked = 3;        // places whose best pose is offered
+constexpr std::size_t kExactlySeen = 8;  // of the turned poses that are compared at last
 constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 // Of the best score that so much contour could have: less speaks against a pose. Without it, views
 // that show more contour would win.
@@ -338,6 +339,12 @@ void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses, int points,
                     });
 }
 
+/// [px] by which the contour of a pose from the search may lie off.
+double PoseSearch::reachOf(const Pose& pose) const {
+  const double depth = std::max(0.03, pose.translation().z());
+  return std::clamp(kReach * camera_.focal_length * model_->radius() / depth, 6.0, 24.0);
+}
+
 std::vector<Pose> PoseSearch::turned(const Pose& camera_from_object) const {
   std::vector<Pose> poses;
   for (const Eigen::Vector3d& pivot : pivots_)
@@ -447,15 +454,17 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     return a.evidence < b.evidence;
   };
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
-    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 8, 6});
+    const double reach = reachOf(starts[i]);
+    refined[i] =
+        refiner_.refine(*model_, fields_, starts[i], {}, {}, {reach, 0.8 * reach, 0.6 * reach});
   });
   const std::size_t promising = std::min(kPromising, refined.size());
   std::partial_sort(refined.begin(), refined.begin() + static_cast<std::ptrdiff_t>(promising),
                     refined.end(), [&](const auto& a, const auto& b) { return less(b, a); });
   refined.resize(promising);
   tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t i) {
-    refined[i] =
-        refiner_.refine(*model_, fields_, refined[i].camera_from_object, {}, {}, {4, 3, 2.5});
+    const Pose& pose = refined[i].camera_from_object;
+    refined[i] = refiner_.refine(*model_, fields_, pose, {}, {}, {0.4 * reachOf(pose), 3, 2.5});
   });
   std::sort(refined.begin(), refined.end(),
             [&](const auto& a, const auto& b) { return less(b, a); });

@@ -51,7 +51,7 @@ constexpr int kPatience = 3;               // frames below it before the object 
 constexpr double kFoundSupport = 0.68;     // share of the contour that a found pose must have
 constexpr double kRefoundSupport = 0.6;    // the same, close to where the object was last
 constexpr double kRefoundReach = 0.03;     // [m]
-constexpr double kFoundInside = 0.4;       // share of the contour inside the images
+constexpr double kFoundInside = 0.3;       // share of the contour inside the images
 constexpr double kSureSupport = 0.7;       // below it the search is asked for its opinion
 constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
 constexpr double kOpinionMargin = 20;                // [nats] by which another pose must be better

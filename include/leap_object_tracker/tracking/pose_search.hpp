@@ -22,8 +22,11 @@ namespace leap_object_tracker {
 /// 1. Places: stable bright regions of the left eye (findBrightRegions) whose size fits the object;
 ///    depth from the same region in the right eye, else from the region's area.
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
-///    of equivalent ones, at each place; scored by the blunt contour likelihood.
+///    of equivalent ones, fitted to the reach of each region; scored by the blunt contour
+///    likelihood and by that reach.
 /// 3. The best ones move in random steps that shrink, then are refined on sub-pixel edges.
+/// 4. The best of each place and its turned ones are compared on the contour of exactly their
+/// views.
 class PoseSearch {
  public:
   PoseSearch(const TrackerParams& params, const ObjectModel& object, const ContourModel& model,
@@ -70,6 +73,7 @@ class PoseSearch {
   std::optional<Pose> fitToRegion(const Pose& pose, const Place& place) const;
   std::vector<Hypothesis> distinct(std::vector<Hypothesis>& hypotheses, std::size_t count,
                                    double apart) const;
+  double reachOf(const Pose& pose) const;
   RefinedPose bestTurned(const RefinedPose& pose) const;
   void scoreAll(std::vector<Hypothesis>& hypotheses, int points, const std::array<GainMap, 2>& maps,
                 const std::vector<Place>& places) const;

@@ -43,6 +43,18 @@ TEST(Mesh, ofAPrismHasItsApexTowardsYAndItsCentroidInTheOrigin) {
   EXPECT_NEAR(highest, 0.04 / std::sqrt(3.0), 1e-12);
 }
 
+TEST(Mesh, throwsAShadow) {
+  // Of a convex body, on average a quarter of its surface (Cauchy 1832).
+  const ShadowArea box = shadowAreaOf(makeBox({0.02, 0.03, 0.04}));
+  EXPECT_NEAR(box.mean / (0.25 * 0.0052), 1, 0.05);
+  EXPECT_NEAR(box.least / 0.0006, 1, 0.15);
+  EXPECT_NEAR(box.largest / std::sqrt(0.0006 * 0.0006 + 0.0008 * 0.0008 + 0.0012 * 0.0012), 1,
+              0.08);
+  const ShadowArea cylinder = shadowAreaOf(makeCylinder(0.015, 0.065));
+  EXPECT_NEAR(cylinder.mean / (0.25 * 2 * M_PI * 0.015 * 0.08), 1, 0.05);
+  EXPECT_EQ(shadowAreaOf(Mesh()).mean, 0);
+}
+
 TEST(Mesh, isReadFromAFileWithItsScale) {
   const TemporaryFolder folder;
   const std::string path =

@@ -76,6 +76,43 @@ TEST_F(MovingBox, isGivenUpWhenItIsGoneAndFoundAgain) {
   EXPECT_LT(positionError(*estimate, frame - 1), 0.002);
 }
 
+TEST_F(MovingBox, thatIsElsewhereThanWhatIsFollowedIsTakenUpInstead) {
+  Tracker tracker(TrackerParams(), object_, camera_);
+  // A quarter of the contour is not there: the pose is followed, but not for sure.
+  Pose wrong = truthAt(0);
+  wrong.linear() = wrong.linear() * rotationFromVector({0, M_PI / 2, 0});
+  tracker.start(wrong);
+  std::optional<PoseEstimate> estimate;
+  for (int frame = 0; frame < 30; ++frame) {
+    RectifiedStereoFrame still = frameAt(0);
+    still.stamp = stampFromSeconds(1 + frame * kPeriod);
+    estimate = tracker.track(still);
+  }
+  ASSERT_TRUE(estimate);
+  EXPECT_LT(positionError(*estimate, 0), 0.001);
+  EXPECT_LT(
+      angleBetween(estimate->camera_from_object.linear(), truthAt(0).linear(), object_.symmetry),
+      0.03);
+}
+
+TEST_F(MovingBox, isNotTakenUpByACornerOfIt) {
+  Tracker tracker(TrackerParams(), object_, camera_);
+  tracker.search();
+  for (int frame = 0; frame < 5; ++frame) {
+    RectifiedStereoFrame corner = frameAt(0);
+    // All but a corner lies beyond the border of the image.
+    const int shift = 265;
+    for (cv::Mat* eye : {&corner.left, &corner.right}) {
+      cv::Mat moved(eye->size(), CV_8UC1, cv::Scalar(4));
+      (*eye)(cv::Rect(0, 0, eye->cols - shift, eye->rows))
+          .copyTo(moved(cv::Rect(shift, 0, eye->cols - shift, eye->rows)));
+      *eye = moved;
+    }
+    corner.stamp = stampFromSeconds(1 + frame * kPeriod);
+    EXPECT_FALSE(tracker.track(corner)) << frame;
+  }
+}
+
 TEST_F(MovingBox, hasTheSamePosesWhateverTheNumberOfThreads) {
   TrackerParams one, two;
   one.threads = 1;

@@ -1,0 +1,78 @@
+#include "leap_object_tracker/tracking/bright_regions.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+namespace leap_object_tracker {
+namespace {
+
+constexpr double kBlack = 3;
+
+cv::Mat dark() { return cv::Mat(240, 320, CV_8UC1, cv::Scalar(kBlack)); }
+
+/// The region whose box is nearest to a rectangle [px].
+const BrightRegion& nearestTo(const std::vector<BrightRegion>& regions, const cv::Rect& box) {
+  const auto apart = [&](const BrightRegion& region) {
+    return std::abs(region.low_u - box.x) + std::abs(region.high_u - box.br().x) +
+           std::abs(region.low_v - box.y) + std::abs(region.high_v - box.br().y);
+  };
+  return *std::min_element(
+      regions.begin(), regions.end(),
+      [&](const BrightRegion& a, const BrightRegion& b) { return apart(a) < apart(b); });
+}
+
+void expectBox(const BrightRegion& region, const cv::Rect& box, double tolerance) {
+  EXPECT_NEAR(region.low_u, box.x - 0.5, tolerance);
+  EXPECT_NEAR(region.high_u, box.br().x - 0.5, tolerance);
+  EXPECT_NEAR(region.low_v, box.y - 0.5, tolerance);
+  EXPECT_NEAR(region.high_v, box.br().y - 0.5, tolerance);
+}
+
+TEST(BrightRegions, areFoundHoweverDim) {
+  for (const double grey : {12.0, 40.0, 250.0}) {
+    cv::Mat image = dark();
+    const cv::Rect box(100, 60, 60, 40);
+    image(box).setTo(grey);
+    const auto regions = findBrightRegions(image);
+    ASSERT_FALSE(regions.empty()) << grey;
+    const BrightRegion& region = nearestTo(regions, box);
+    expectBox(region, box, 1.6);
+    EXPECT_NEAR(region.area / box.area(), 1, 0.1);
+    EXPECT_LE(region.faintest, region.brightest);
+    EXPECT_LT(region.brightest, grey);
+    EXPECT_EQ(region.known.sum(), BrightRegion::kDirections);
+    // To the right, down, and towards the lower right corner.
+    EXPECT_NEAR(region.extents[0], box.br().x - 0.5, 1.6);
+    EXPECT_NEAR(region.extents[4], box.br().y - 0.5, 1.6);
+    EXPECT_NEAR(region.extents[2], (box.br().x + box.br().y - 1) * std::sqrt(0.5), 2.5);
+  }
+}
+
+TEST(BrightRegions, closeTheDarkTextureOfABody) {
+  cv::Mat image = dark();
+  const cv::Rect box(100, 60, 90, 70);
+  image(box).setTo(120);
+  for (int u = box.x + 10; u + 10 < box.br().x; u += 20)
+    image(cv::Rect(u, box.y, 10, box.height)).setTo(kBlack);
+  const BrightRegion& region = nearestTo(findBrightRegions(image), box);
+  expectBox(region, box, 2.5);
+  EXPECT_GT(region.closing, 0);
+}
+
+TEST(BrightRegions, doNotKnowHowFarTheyReachBeyondTheImage) {
+  cv::Mat image = dark();
+  image(cv::Rect(0, 80, 50, 40)).setTo(100);
+  const BrightRegion& region = nearestTo(findBrightRegions(image), {0, 80, 50, 40});
+  EXPECT_EQ(region.known[0], 1);  // to the right
+  EXPECT_EQ(region.known[8], 0);  // to the left
+}
+
+TEST(BrightRegions, areNoneInTheDark) {
+  EXPECT_TRUE(findBrightRegions(dark()).empty());
+  EXPECT_TRUE(findBrightRegions(cv::Mat()).empty());
+}
+
+}  // namespace
+}  // namespace leap_object_tracker
