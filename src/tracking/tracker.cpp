@@ -27,15 +27,19 @@ double millisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-constexpr double kLongestStep = 0.25;   // [s] longer gaps count as this long
-constexpr int kHypotheses = 4;          // refined a frame
-constexpr double kCommonPixels = 0.1;   // [px] of calibration
-constexpr double kCommonShape = 8e-5;   // [m] of the object's shape
-constexpr double kUnknownSpin = 0.25;   // [rad] of a free axis that nothing binds
-constexpr double kDoubtShare = 0.3;     // of the particles, drawn as if the last pose were wrong
-constexpr double kDoubtReach = 4;       // [px] by which it then lies off
-constexpr double kDoubtCost = 5;        // [nats] against a pose that says so
-constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
+constexpr double kLongestStep = 0.25;    // [s] longer gaps count as this long
+constexpr int kHypotheses = 4;           // refined a frame
+constexpr double kPoorFit = 0.45;        // [px] of the edges' residual
+constexpr double kWorseFit = 1.25;       // times the residual of the frames before
+constexpr int kMoreHypotheses = 8;       // refined then
+constexpr std::size_t kCandidates = 96;  // of the particles, to be refined
+constexpr double kCommonPixels = 0.1;    // [px] of calibration
+constexpr double kCommonShape = 8e-5;    // [m] of the object's shape
+constexpr double kUnknownSpin = 0.25;    // [rad] of a free axis that nothing binds
+constexpr double kDoubtShare = 0.3;      // of the particles, drawn as if the last pose were wrong
+constexpr double kDoubtReach = 4;        // [px] by which it then lies off
+constexpr double kDoubtCost = 5;         // [nats] against a pose that says so
+constexpr double kLeastSupport = 0.40;   // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
 constexpr double kLearningSupport = 0.7;     // of a pose at which the object's looks are learned
 constexpr int kYoungFrames = 80;  // after a start, in which turned poses are looked at often
@@ -420,7 +424,7 @@ class Tracker::Impl {
     const auto& scores = filter_.logLikelihoods();
     order_.resize(scores.size());
     std::iota(order_.begin(), order_.end(), 0U);
-    const std::size_t candidates = std::min<std::size_t>(order_.size(), 64);
+    const std::size_t candidates = std::min<std::size_t>(order_.size(), kCandidates);
     std::partial_sort(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(candidates),
                       order_.end(), [&](std::uint32_t a, std::uint32_t b) {
                         return scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
@@ -475,6 +479,26 @@ class Tracker::Impl {
     RefinedPose best = refined[0];
     for (const RefinedPose& candidate : refined)
       if (score(candidate) > score(best)) best = candidate;
+    if (best.residual > std::max(kPoorFit, kWorseFit * usual_residual_)) {
+      // Edges that scatter belong to something else in part: more particles, closer to each other.
+      const std::size_t tried = starts.size();
+      starts.push_back(best.camera_from_object);
+      for (std::size_t i = 0; i < candidates && starts.size() < tried + kMoreHypotheses; ++i) {
+        const Pose pose = toPose(filter_.poses()[order_[i]]);
+        if (std::none_of(starts.begin(), starts.end(), [&](const Pose& other) {
+              return (pose.translation() - other.translation()).norm() < 0.08 * model_.radius() &&
+                     angleBetween(pose.linear(), other.linear()) < 0.08;
+            }))
+          starts.push_back(pose);
+      }
+      refined.resize(starts.size());
+      tbb::parallel_for(tried, starts.size(), [&](std::size_t i) {
+        refined[i] = refiner_.refine(model_, measurement_.fields(), starts[i], doubted, appearance_,
+                                     {8, 5, 3, 2.5});
+      });
+      for (const RefinedPose& candidate : refined)
+        if (score(candidate) > score(best)) best = candidate;
+    }
     const bool use_features = features_.speak() && score(by_features) >= score(best);
     if (use_features) best = by_features;
     const bool likely = expected(best.camera_from_object);
@@ -567,6 +591,7 @@ class Tracker::Impl {
     }
     if (supported) {
       belief_.update(refined.camera_from_object, refined.information);
+      usual_residual_ += 0.1 * (refined.residual - usual_residual_);
       if (!features_.alone() && report_.support > kLearningSupport)
         refiner_.learn(model_, measurement_.fields(), belief_.pose, appearance_);
       weak_frames_ = 0;
@@ -601,6 +626,7 @@ class Tracker::Impl {
   Appearance appearance_;
   std::vector<std::uint32_t> order_;  ///< of the particles, the best ones first
   int weak_frames_ = 0;
+  double usual_residual_ = 0;  ///< [px]
   int frames_to_opinion_ = kFirstOpinion, opinion_period_ = kFirstOpinion;
   int frames_lost_ = 0;
   bool fresh_ = false;
