@@ -53,6 +53,7 @@ constexpr double kTrustedLandmarks = 0.5;  // share of landmarks that make turne
 constexpr double kExact = 0.5;             // [px]
 constexpr int kPatience = 3;               // frames below it before the object counts as lost
 constexpr double kFoundSupport = 0.68;     // share of the contour that a found pose must have
+constexpr double kSureStart = 0.85;        // support that needs no other frame to prove itself
 constexpr double kRefoundSupport = 0.6;    // the same, close to where the object was last
 constexpr double kRefoundReach = 0.03;     // [m]
 constexpr double kFoundInside = 0.3;       // share of the contour inside the images
@@ -161,10 +162,13 @@ class Tracker::Impl {
     report_.edges_ms = report_.filter_ms = report_.search_ms = 0;
     if (report_.state == TrackerState::kIdle) return std::nullopt;
 
-    const Pose camera_motion = cameraMotion(fixed_from_camera);
+    Pose camera_motion = cameraMotion(fixed_from_camera);
     if (report_.state != TrackerState::kTracking && !confirming_) {
       lookFor(frame, camera_motion);
-      return std::nullopt;
+      // Another body may look the same: one that was tracked before must prove itself.
+      const bool sure = !remembered_ && report_.support >= kSureStart;
+      if (!confirming_ || !sure) return std::nullopt;
+      camera_motion.setIdentity();  // the pose is that of this frame
     }
     const auto begun = Clock::now();
     predict(frame.stamp, camera_motion);
@@ -201,7 +205,7 @@ class Tracker::Impl {
     return estimate;
   }
 
-  /// Searches one frame; a pose that is well supported must prove itself in the next one.
+  /// Searches one frame; a pose that is supported must prove itself in the next one.
   void lookFor(const RectifiedStereoFrame& frame, const Pose& camera_motion) {
     const auto started = Clock::now();
     if (last_seen_) last_seen_ = camera_motion * *last_seen_;
