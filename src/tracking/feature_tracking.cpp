@@ -127,17 +127,18 @@ bool FeatureTracking::contradict(const Pose& camera_from_object, double contour_
          missing(camera_from_object, measurement_.support(camera_from_object));
 }
 
-bool FeatureTracking::refuse(const Pose& found) {
+bool FeatureTracking::refuse(const Pose& found) const {
   const std::vector<Pose> poses = equivalents(found);
-  if (measurement_.features().size() < kTextured ||
-      std::none_of(poses.begin(), poses.end(), [&](const Pose& pose) { return wouldKnow(pose); }))
-    return false;
-  if (++refusals_ < kRefusals) return true;
+  return measurement_.features().size() >= kTextured &&
+         std::any_of(poses.begin(), poses.end(), [&](const Pose& pose) { return wouldKnow(pose); });
+}
+
+void FeatureTracking::countRefusal() {
+  if (++refusals_ < kRefusals) return;
   refusals_ = 0;
   votes_.clear();
   voters_ = 0;
   measurement_.landmarks().clear();
-  return false;
 }
 
 std::optional<Pose> FeatureTracking::recall(const RectifiedStereoFrame& frame,

@@ -214,12 +214,15 @@ class Tracker::Impl {
       return;
     }
     std::optional<Pose> known;
+    bool refused = false;
     const auto accept = [&](const RefinedPose& candidate) {
       if (!goodStart(candidate)) return false;
       const Pose pose = asLastSeen(candidate.camera_from_object);
       const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
       known = features_.absolute(frame, regions(belief), pose);
-      return known || !last_seen_ || !features_.refuse(pose);
+      const bool other = !known && last_seen_ && features_.refuse(pose);
+      refused = refused || other;
+      return !other;
     };
     bool accepted = false;
     const std::optional<RefinedPose> found =
@@ -227,6 +230,7 @@ class Tracker::Impl {
                      [&](const RefinedPose& candidate) { return accepted = accept(candidate); });
     report_.search_ms = millisecondsSince(started);
     report_.support = found ? found->support() : 0;
+    if (!accepted && refused) features_.countRefusal();
     if (!accepted) {
       if (++frames_lost_ > kNearFrames)
         last_seen_.reset(), report_.state = TrackerState::kSearching;
@@ -254,7 +258,8 @@ class Tracker::Impl {
   /// While much of the contour is missing, something may hide the object, or it may be elsewhere:
   /// the search tells, more and more seldom as long as it agrees.
   void askForSecondOpinion(const RectifiedStereoFrame& frame) {
-    if (features_.alone() || report_.support >= kSureSupport) {
+    if (features_.alone() || report_.support >= kSureSupport ||
+        features_.support(belief_.pose) > kTrustedLandmarks) {
       frames_to_opinion_ = opinion_period_ = kFirstOpinion;
       return;
     }
@@ -275,7 +280,6 @@ class Tracker::Impl {
     if (!better) return;
     takeUp(asLastSeen(found->camera_from_object), frame.stamp, false);
     report_.state = TrackerState::kLost;
-    frames_to_opinion_ = opinion_period_ = kFirstOpinion;
   }
 
   /// Looks for landmarks where the object was last, whatever hides its contour.
@@ -293,6 +297,7 @@ class Tracker::Impl {
     belief_ = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
     initializeFilter();
     features_.restart(sure);
+    frames_to_opinion_ = opinion_period_ = kFirstOpinion;
     last_stamp_ = stamp;
     weak_frames_ = 0;
     fresh_ = true;

@@ -69,8 +69,11 @@ class FeatureTracking {
                              const std::array<cv::Rect, 2>& regions, const Pose& near);
 
   /// Whether a pose that was found, and that absolute() could not confirm, is of another thing of
-  /// the same shape. After many refusals in a row the landmarks are forgotten instead.
-  bool refuse(const Pose& found);
+  /// the same shape.
+  bool refuse(const Pose& found) const;
+  /// A frame in which all that was found was refused: after many in a row the landmarks are
+  /// forgotten.
+  void countRefusal();
 
   const LandmarkMap& landmarks() const { return measurement_.landmarks(); }
 
