@@ -27,19 +27,19 @@ double millisecondsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-constexpr double kLongestStep = 0.25;    // [s] longer gaps count as this long
-constexpr int kHypotheses = 4;           // refined a frame
-constexpr double kPoorFit = 0.45;        // [px] of the edges' residual
-constexpr double kWorseFit = 1.25;       // times the residual of the frames before
-constexpr int kMoreHypotheses = 8;       // refined then
-constexpr std::size_t kCandidates = 96;  // of the particles, to be refined
-constexpr double kCommonPixels = 0.1;    // [px] of calibration
-constexpr double kCommonShape = 8e-5;    // [m] of the object's shape
-constexpr double kUnknownSpin = 0.25;    // [rad] of a free axis that nothing binds
-constexpr double kDoubtShare = 0.3;      // of the particles, drawn as if the last pose were wrong
-constexpr double kDoubtReach = 4;        // [px] by which it then lies off
-constexpr double kDoubtCost = 5;         // [nats] against a pose that says so
-constexpr double kLeastSupport = 0.40;   // share of the contour to stand by a pose
+constexpr double kLongestStep = 0.25;     // [s] longer gaps count as this long
+constexpr int kHypotheses = 4;            // refined a frame
+constexpr double kPoorFit = 0.45;         // [px] of the edges' residual
+constexpr double kWorseFit = 1.25;        // times the residual of the frames before
+constexpr int kMoreHypotheses = 20;       // refined then
+constexpr std::size_t kCandidates = 300;  // of the particles, to be refined
+constexpr double kCommonPixels = 0.1;     // [px] of calibration
+constexpr double kCommonShape = 8e-5;     // [m] of the object's shape
+constexpr double kUnknownSpin = 0.25;     // [rad] of a free axis that nothing binds
+constexpr double kDoubtShare = 0.3;       // of the particles, drawn as if the last pose were wrong
+constexpr double kDoubtReach = 4;         // [px] by which it then lies off
+constexpr double kDoubtCost = 5;          // [nats] against a pose that says so
+constexpr double kLeastSupport = 0.40;    // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
 constexpr double kLearningSupport = 0.7;     // of a pose at which the object's looks are learned
 constexpr int kYoungFrames = 80;  // after a start, in which turned poses are looked at often
@@ -492,11 +492,17 @@ class Tracker::Impl {
       // Edges that scatter belong to something else in part: more particles, closer to each other.
       const std::size_t tried = starts.size();
       starts.push_back(best.camera_from_object);
+      // Depth is known least.
+      const double along = std::sqrt(doubt(belief_.pose)(2, 2)) / belief_.pose.translation().z();
+      for (const double share : {-1.0, -0.5, 0.5, 1.0}) {
+        starts.push_back(belief_.pose);
+        starts.back().translation() *= 1 + share * along;
+      }
       for (std::size_t i = 0; i < candidates && starts.size() < tried + kMoreHypotheses; ++i) {
         const Pose pose = toPose(filter_.poses()[order_[i]]);
         if (std::none_of(starts.begin(), starts.end(), [&](const Pose& other) {
-              return (pose.translation() - other.translation()).norm() < 0.08 * model_.radius() &&
-                     angleBetween(pose.linear(), other.linear()) < 0.08;
+              return (pose.translation() - other.translation()).norm() < 0.06 * model_.radius() &&
+                     angleBetween(pose.linear(), other.linear()) < 0.06;
             }))
           starts.push_back(pose);
       }
