@@ -31,7 +31,7 @@ constexpr double kLongestStep = 0.25;     // [s] longer gaps count as this long
 constexpr int kHypotheses = 4;            // refined a frame
 constexpr double kPoorFit = 0.45;         // [px] of the edges' residual
 constexpr double kWorseFit = 1.25;        // times the residual of the frames before
-constexpr int kMoreHypotheses = 20;       // refined then
+constexpr int kMoreHypotheses = 16;       // refined then
 constexpr std::size_t kCandidates = 300;  // of the particles, to be refined
 constexpr double kCommonPixels = 0.1;     // [px] of calibration
 constexpr double kCommonShape = 8e-5;     // [m] of the object's shape
@@ -297,6 +297,7 @@ class Tracker::Impl {
     belief_ = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
     initializeFilter();
     features_.restart(sure);
+    usual_residual_ = 0;
     frames_to_opinion_ = opinion_period_ = kFirstOpinion;
     last_stamp_ = stamp;
     weak_frames_ = 0;
@@ -488,7 +489,7 @@ class Tracker::Impl {
     RefinedPose best = refined[0];
     for (const RefinedPose& candidate : refined)
       if (score(candidate) > score(best)) best = candidate;
-    if (best.residual > std::max(kPoorFit, kWorseFit * usual_residual_)) {
+    if (usual_residual_ > 0 && best.residual > std::max(kPoorFit, kWorseFit * usual_residual_)) {
       // Edges that scatter belong to something else in part: more particles, closer to each other.
       const std::size_t tried = starts.size();
       starts.push_back(best.camera_from_object);
@@ -509,7 +510,7 @@ class Tracker::Impl {
       refined.resize(starts.size());
       tbb::parallel_for(tried, starts.size(), [&](std::size_t i) {
         refined[i] = refiner_.refine(model_, measurement_.fields(), starts[i], doubted, appearance_,
-                                     {8, 5, 3, 2.5});
+                                     {8, 5, 3});
       });
       for (const RefinedPose& candidate : refined)
         if (score(candidate) > score(best)) best = candidate;
@@ -606,7 +607,9 @@ class Tracker::Impl {
     }
     if (supported) {
       belief_.update(refined.camera_from_object, refined.information);
-      usual_residual_ += 0.1 * (refined.residual - usual_residual_);
+      usual_residual_ = usual_residual_ > 0
+                            ? usual_residual_ + 0.1 * (refined.residual - usual_residual_)
+                            : refined.residual;
       if (!features_.alone() && report_.support > kLearningSupport)
         refiner_.learn(model_, measurement_.fields(), belief_.pose, appearance_);
       weak_frames_ = 0;
