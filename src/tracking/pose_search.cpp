@@ -450,8 +450,8 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     first = last;
   }
   std::vector<RefinedPose> refined(starts.size());
-  const auto less = [](const RefinedPose& a, const RefinedPose& b) {
-    return a.evidence < b.evidence;
+  const auto better = [](const RefinedPose& a, const RefinedPose& b) {
+    return a.evidence > b.evidence;
   };
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
     const double reach = reachOf(starts[i]);
@@ -460,14 +460,13 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   });
   const std::size_t promising = std::min(kPromising, refined.size());
   std::partial_sort(refined.begin(), refined.begin() + static_cast<std::ptrdiff_t>(promising),
-                    refined.end(), [&](const auto& a, const auto& b) { return less(b, a); });
+                    refined.end(), better);
   refined.resize(promising);
   tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t i) {
     const Pose& pose = refined[i].camera_from_object;
     refined[i] = refiner_.refine(*model_, fields_, pose, {}, {}, {0.4 * reachOf(pose), 3, 2.5});
   });
-  std::sort(refined.begin(), refined.end(),
-            [&](const auto& a, const auto& b) { return less(b, a); });
+  std::sort(refined.begin(), refined.end(), better);
   std::optional<RefinedPose> best;
   std::vector<Eigen::Vector3d> asked;
   for (const RefinedPose& candidate : refined) {

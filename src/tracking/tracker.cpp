@@ -76,6 +76,18 @@ double surprise(const PosePrior& prior, const Pose& pose) {
   return 0.5 * shift.dot(prior.information * shift);
 }
 
+/// Puts the indices of the `count` highest scores in front, the best ones first, of equal ones the
+/// lower index.
+template <class Scores>
+void putBestFirst(const Scores& scores, std::size_t count, std::vector<std::uint32_t>& order) {
+  order.resize(scores.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
+                    [&](std::uint32_t a, std::uint32_t b) {
+                      return scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
+                    });
+}
+
 void check(bool right, const char* message) {
   if (!right) throw std::invalid_argument(message);
 }
@@ -214,7 +226,7 @@ class Tracker::Impl {
       return;
     }
     std::optional<Pose> known;
-    bool refused = false;
+    bool accepted = false, refused = false;
     const auto accept = [&](const RefinedPose& candidate) {
       if (!goodStart(candidate)) return false;
       const Pose pose = asLastSeen(candidate.camera_from_object);
@@ -222,16 +234,13 @@ class Tracker::Impl {
       known = features_.absolute(frame, regions(belief), pose);
       const bool other = !known && last_seen_ && features_.refuse(pose);
       refused = refused || other;
-      return !other;
+      return accepted = !other;
     };
-    bool accepted = false;
-    const std::optional<RefinedPose> found =
-        search_.find(frame, last_seen_,
-                     [&](const RefinedPose& candidate) { return accepted = accept(candidate); });
+    const std::optional<RefinedPose> found = search_.find(frame, last_seen_, accept);
     report_.search_ms = millisecondsSince(started);
     report_.support = found ? found->support() : 0;
-    if (!accepted && refused) features_.countRefusal();
     if (!accepted) {
+      if (refused) features_.countRefusal();
       if (++frames_lost_ > kNearFrames)
         last_seen_.reset(), report_.state = TrackerState::kSearching;
       return;
@@ -432,13 +441,8 @@ class Tracker::Impl {
     const PosePrior with_features = features_.refine(prior);
     std::vector<Pose> starts{belief_.pose};
     const auto& scores = filter_.logLikelihoods();
-    order_.resize(scores.size());
-    std::iota(order_.begin(), order_.end(), 0U);
-    const std::size_t candidates = std::min<std::size_t>(order_.size(), kCandidates);
-    std::partial_sort(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(candidates),
-                      order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-                        return scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
-                      });
+    const std::size_t candidates = std::min<std::size_t>(scores.size(), kCandidates);
+    putBestFirst(scores, candidates, order_);
     for (std::size_t i = 0; i < candidates && starts.size() < kHypotheses; ++i) {
       const Pose pose = toPose(filter_.poses()[order_[i]]);
       const bool near = std::any_of(starts.begin() + 1, starts.end(), [&](const Pose& other) {
@@ -561,13 +565,9 @@ class Tracker::Impl {
     std::vector<float> scores(poses.size());
     measurement_.score(model_, ContourMeasurement::Sharpness::kBlunt, poses.data(), poses.size(),
                        scores.data());
-    std::vector<std::size_t> order(poses.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    const std::size_t count = std::min(kTurnedRefined, order.size());
-    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
-                      order.end(), [&](std::size_t a, std::size_t b) {
-                        return scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
-                      });
+    const std::size_t count = std::min(kTurnedRefined, scores.size());
+    std::vector<std::uint32_t> order;
+    putBestFirst(scores, count, order);
     std::vector<RefinedPose> refined(count + 1);
     tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t i) {
       refined[i] = refiner_.refine(model_, measurement_.fields(),

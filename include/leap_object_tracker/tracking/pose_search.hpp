@@ -25,8 +25,7 @@ namespace leap_object_tracker {
 ///    of equivalent ones, fitted to the reach of each region; scored by the blunt contour
 ///    likelihood and by that reach.
 /// 3. The best ones move in random steps that shrink, then are refined on sub-pixel edges.
-/// 4. The best of each place and its turned ones are compared on the contour of exactly their
-/// views.
+/// 4. The best of each place and its turned ones are compared on the contour of their exact views.
 class PoseSearch {
  public:
   PoseSearch(const TrackerParams& params, const ObjectModel& object, const ContourModel& model,
@@ -54,7 +53,7 @@ class PoseSearch {
     float score = 0;
     std::size_t place = 0;
   };
-  /// Where the object may be, and the box that it then fills in one eye.
+  /// Where the object may be, and the region that it then fills in one eye.
   struct Place {
     Eigen::Vector3d point;  ///< [m]
     double doubt = 0;
