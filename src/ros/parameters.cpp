@@ -167,7 +167,7 @@ TrackerNodeParams readTrackerNodeParams(ParameterReader& reader) {
     r.read("outlier_share", p.outlier_share, {0.001, 0.99});
     r.read("edge_sigma", p.edge_sigma, {0.01, 10});
     r.read("edge_radius", p.edge_radius, {0, 0.01});
-    r.read("limb_shift", p.limb_shift, {0, 5});
+    r.read("limb_darkening", p.limb_darkening, {0, 2});
     std::string cache = "auto";
     r.read("cache_folder", cache);
     p.cache_folder = cache == "auto" ? usersCacheFolder() : cache;

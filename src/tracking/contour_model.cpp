@@ -119,6 +119,10 @@ class PolyhedronTable : public ContourModel::Table {
       for (std::size_t side = 0; side < 2; ++side)
         if (side == 0 ? first : second)
           segment.faces[side] = faces_[edge.faces[side]].head<3>().cast<double>();
+      if (first && second) {
+        const Eigen::Vector3d &own = segment.faces[0], &other = segment.faces[1];
+        segment.orderFaces(own * own.dot(other) - other);
+      }
       segments.push_back(segment);
     }
     return segments;
@@ -182,7 +186,7 @@ class CylinderTable : public ContourModel::Table {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector3d normal(std::cos(limb), side * std::sin(limb), 0);
       const Eigen::Vector3d foot = radius * normal, up(0, 0, height / 2);
-      all.push_back({foot - up, foot + up, normal, true});
+      all.push_back({foot - up, foot + up, normal, radius});
     }
     for (const int end : {-1, 1})
       addRim(
@@ -231,9 +235,10 @@ class CylinderTable : public ContourModel::Table {
       const double angle = -M_PI + (i + 0.5) * piece;
       const Eigen::Vector3d radial(std::cos(angle), std::sin(angle), 0);
       const Rim rim = judge(angle, radial);
-      if (rim.visible)
-        all.push_back(
-            {at(angle - piece / 2), at(angle + piece / 2), rim.outward, false, rim.faces});
+      if (!rim.visible) continue;
+      all.push_back({at(angle - piece / 2), at(angle + piece / 2), rim.outward, 0, rim.faces});
+      if (!rim.outward.isZero()) continue;
+      all.back().orderFaces(Eigen::Vector3d(0, 0, -end));
     }
   }
 

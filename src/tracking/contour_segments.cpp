@@ -25,7 +25,7 @@ std::vector<ContourPoint> spread(const std::vector<ContourSegment>& segments, in
       point.tangent = (along / length).cast<float>();
       point.outward = segment.outward.cast<float>();
       point.length = static_cast<float>(step);
-      point.limb = segment.limb ? 1.0F : 0.0F;
+      point.limb = static_cast<float>(segment.limb);
       for (std::size_t side = 0; side < 2; ++side)
         point.faces[side] = segment.faces[side].cast<float>();
       points.push_back(point);
@@ -36,6 +36,10 @@ std::vector<ContourPoint> spread(const std::vector<ContourSegment>& segments, in
 }
 
 }  // namespace
+
+void ContourSegment::orderFaces(const Eigen::Vector3d& into) {
+  if (into.dot((end - start).cross(faces[0])) < 0) std::swap(faces[0], faces[1]);
+}
 
 void fillArrays(ContourView& view, const std::vector<ContourPoint>& scored, int points) {
   const auto n = static_cast<std::size_t>(points);

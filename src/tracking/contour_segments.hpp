@@ -13,9 +13,13 @@ namespace leap_object_tracker {
 struct ContourSegment {
   Eigen::Vector3d start, end;
   Eigen::Vector3d outward;  ///< as in ContourPoint
-  bool limb = false;        ///< as in ContourPoint
+  double limb = 0;          ///< as in ContourPoint
   /// As in ContourPoint.
   std::array<Eigen::Vector3d, 2> faces{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+
+  /// Puts the faces in their order.
+  /// @param into from the segment into the first face
+  void orderFaces(const Eigen::Vector3d& into);
 };
 
 /// Spreads the points of a view evenly over the length of its segments.

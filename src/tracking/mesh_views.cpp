@@ -328,6 +328,7 @@ class ContourFinder {
         if (!outline || normal.dot(ray) > 0)
           segment.faces[side] = normal.dot(ray) > 0 ? normal : Vector3d(-normal);
       }
+      if (!outline && edge.kind == Kind::kSharp) segment.orderFaces(edge.apexes[0] - edge.start);
       segments.push_back(segment);
     }
   }
@@ -375,7 +376,16 @@ class ContourFinder {
     if (!(half.norm() > 1e-9 * radius_)) return;
     const Vector3d middle = (start + end) / 2;
     const Vector3d outward = normal.dot(awayInImage(edge, ray)) < 0 ? Vector3d(-normal) : normal;
-    segments.push_back({middle - half, middle + half, outward, true});
+    // Facets as wide as the edge is from their far corners.
+    const double width = 0.5 * (offEdge(edge, 0) + offEdge(edge, 1));
+    const double bend = std::atan2(first.cross(second).norm(), first.dot(second));
+    segments.push_back({middle - half, middle + half, outward, std::max(1e-6, width / bend)});
+  }
+
+  /// [m] from an edge to the far corner of a triangle.
+  static double offEdge(const Edge& edge, std::size_t side) {
+    const Vector3d along = (edge.end - edge.start).normalized();
+    return along.cross(edge.apexes[side] - edge.start).norm();
   }
 
   Mesh mesh_;
@@ -479,7 +489,7 @@ class ViewFile {
   }
 
  private:
-  static constexpr std::uint64_t kVersion = 5;  ///< of the format and of how views are found
+  static constexpr std::uint64_t kVersion = 6;  ///< of the format and of how views are found
   static_assert(sizeof(ContourPoint) == 17 * sizeof(float), "written as bytes, without gaps");
 
   template <class T>

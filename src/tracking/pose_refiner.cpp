@@ -35,7 +35,11 @@ constexpr double kFine = 2.6;           // [px] ranges below this are searched b
 constexpr int kProfile = 7;             // [px] half length of a profile that steps are fitted to
 constexpr double kLargestShift = 2;     // [px] of a fitted step
 constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rectified image
-constexpr float kSameLine = 0.7F;               // [px]
+// [px^2] that smoothing, slopes by differences and bilinear interpolation add to its square.
+constexpr double kSearchBlur = 1.9;
+constexpr double kLampSpacing = 0.035;  // [m] along the baseline, the middle one between the eyes
+constexpr float kSameLine = 0.7F;       // [px]
+constexpr float kBlend = 2.9F;          // [px] lines farther apart do not blur together
 // [px] by how much the rounding and the gloss of an edge between two visible faces may move its
 // image.
 constexpr double kCreaseDoubt = 1.2;
@@ -118,6 +122,97 @@ static double expectedContrast(const ContourPoint& point, const Eigen::Vector3f&
   return share * share;
 }
 
+/// Signed step of the brightness along tangent x normal at a contour point, of a matt body in front
+/// of the dark; of an outline towards the outside.
+static float expectedStep(const ContourPoint& point, const Eigen::Vector3f& to_light) {
+  constexpr float kLeastOutline = 0.15F, kLimb = 0.5F;
+  const auto brightness = [&](std::size_t face) {
+    return std::max(0.0F, point.faces[face].dot(to_light));
+  };
+  if (point.limb > 0) return -kLimb;
+  if (point.outline()) return -std::max(kLeastOutline, brightness(0) + brightness(1));
+  return brightness(0) - brightness(1);
+}
+
+/// Where the limb of a matt round body shows that three lamps in a row light from beside the eye.
+class LimbShift {
+ public:
+  LimbShift() {
+    tbb::parallel_for(0, kRadii, [&](int r) {
+      for (int l = 0; l < kLits; ++l)
+        for (int s = 0; s < kSpreads; ++s)
+          shifts_[index(r, l, s)] =
+              steepest(std::exp2(kFirstRadius + r), kFirstLit + l * kLitStep, s * kSpreadStep);
+    });
+  }
+
+  /// How far inside, in deviations of the blur.
+  /// @param radius in such deviations
+  /// @param lit cosine between the normal at the limb and the middle lamp
+  /// @param spread by which that of the other two is more and less
+  double at(double radius, double lit, double spread) const {
+    const auto place = [](double x, int count) { return std::clamp(x, 0.0, count - 1.001); };
+    const double r = place(std::log2(std::max(radius, 1e-3)) - kFirstRadius, kRadii);
+    const double l = place((lit - kFirstLit) / kLitStep, kLits);
+    const double s = place(std::abs(spread) / kSpreadStep, kSpreads);
+    double sum = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const int dr = corner & 1, dl = corner >> 1 & 1, ds = corner >> 2;
+      const auto share = [](double x, int d) {
+        const double rest = x - std::floor(x);
+        return d == 0 ? 1 - rest : rest;
+      };
+      sum += share(r, dr) * share(l, dl) * share(s, ds) *
+             shifts_[index(static_cast<int>(r) + dr, static_cast<int>(l) + dl,
+                           static_cast<int>(s) + ds)];
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr int kRadii = 9, kLits = 13, kSpreads = 5;
+  static constexpr double kFirstRadius = -2, kFirstLit = -0.6, kLitStep = 0.1, kSpreadStep = 0.15;
+
+  static std::size_t index(int r, int l, int s) {
+    return static_cast<std::size_t>((r * kLits + l) * kSpreads + s);
+  }
+
+  /// Steepest place of the blurred brightness: the sum over the lamps of max(0, n * l), n the
+  /// normal that turns from the limb to the eye (Lambert).
+  static double steepest(double radius, double lit, double spread) {
+    constexpr double kFirst = -2, kLast = 3, kStep = 0.1, kFar = 3.5;
+    constexpr int kParts = 64;
+    const auto slopeAt = [&](double place) {
+      // Distance from the limb, by its root.
+      const double end = std::sqrt(std::clamp(place + kFar, 0.0, 2 * radius));
+      double slope = 0;
+      for (int k = 0; k < kParts; ++k) {
+        const double root = end * (k + 0.5) / kParts, inside = root * root;
+        const double outwards = 1 - inside / radius;
+        const double towards = std::sqrt(std::max(0.0, 1 - outwards * outwards));
+        double brightness = 0;
+        for (const double lamp : {lit - spread, lit, lit + spread})
+          brightness +=
+              std::max(0.0, lamp * outwards + std::sqrt(std::max(0.0, 1 - lamp * lamp)) * towards);
+        const double apart = inside - place;
+        slope += brightness * apart * std::exp(-0.5 * apart * apart) * root;
+      }
+      return slope * end;
+    };
+    double best = 0, before = 0, after = 0, found = 0, last = slopeAt(kFirst - kStep);
+    double here = slopeAt(kFirst);
+    for (double place = kFirst; place < std::min(kLast, radius + 1); place += kStep) {
+      const double next = slopeAt(place + kStep);
+      if (here > best) best = here, before = last, after = next, found = place;
+      last = here, here = next;
+    }
+    const double bend = before - 2 * best + after;
+    return bend < 0 ? found + 0.5 * kStep * (before - after) / bend : found;
+  }
+
+  std::array<double, static_cast<std::size_t>(kRadii* kLits* kSpreads)> shifts_{};
+};
+
 /// One contour point that was looked for in one eye.
 struct PoseRefiner::Match {
   Twist jacobian;                 ///< of the offset along the normal, by the camera twist [px]
@@ -127,6 +222,9 @@ struct PoseRefiner::Match {
   double length = 0;              ///< [px]
   Eigen::Vector2f place, normal;  ///< [px], unit vector in the image
   float clearance = 0;            ///< [px] to the next line of the contour beside this one
+  float step = 0;                 ///< expectedStep() along the normal, times the length
+  float merged = 0;               ///< [px] along the normal to where lines on one place show
+  float blended = 0;              ///< [px] the same for lines that blur together
   float before = -kClearance;     ///< [px] where the next line against the normal is crossed
   float after = kClearance;       ///< [px] the same along the normal
   int eye = 0;
@@ -144,28 +242,42 @@ struct PoseRefiner::Match {
 /// How far another line of the contour runs beside each: an edge between the two belongs to the
 /// nearer. Looks at the matches from `first` on.
 void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches) {
-  thread_local std::vector<std::array<float, 4>> lines;
+  thread_local std::vector<std::array<float, 5>> lines;
   lines.clear();
   for (std::size_t j = first; j < matches.size(); j += 2)
-    lines.push_back(
-        {matches[j].place.x(), matches[j].place.y(), matches[j].normal.x(), matches[j].normal.y()});
+    lines.push_back({matches[j].place.x(), matches[j].place.y(), matches[j].normal.x(),
+                     matches[j].normal.y(), matches[j].step});
   for (std::size_t i = first; i < matches.size(); i += 2) {
     const float u = matches[i].place.x(), v = matches[i].place.y();
     const float nu = matches[i].normal.x(), nv = matches[i].normal.y();
     float before = -kClearance, after = kClearance;
+    float same = 0, same_moment = 0, near = 0, near_moment = 0;
     for (const auto& line : lines) {
       const float du = line[0] - u, dv = line[1] - v;
-      const float across = nu * du + nv * dv;
-      const bool beside = (std::abs(nu * dv - nv * du) < kAlongside) &
-                          (std::abs(nu * line[2] + nv * line[3]) > 0.8F);
+      const float across = nu * du + nv * dv, parallel = nu * line[2] + nv * line[3];
+      const bool beside = (std::abs(nu * dv - nv * du) < kAlongside) & (std::abs(parallel) > 0.8F);
       before = beside && across < -kSameLine && across > before ? across : before;
       after = beside && across > kSameLine && across < after ? across : after;
+      const float step = !beside ? 0 : parallel > 0 ? line[4] : -line[4];
+      const float on_line = std::abs(across) < kSameLine ? step : 0;
+      const float share = std::max(0.0F, 1 - across * across * (1 / (kBlend * kBlend)));
+      const float blurred = step * share * share;
+      same += on_line;
+      same_moment += on_line * across;
+      near += blurred;
+      near_moment += blurred * across;
     }
+    const auto middle = [](float moment, float sum, float limit) {
+      return std::abs(sum) > 1e-3F ? std::clamp(moment / sum, -limit, limit) : 0.0F;
+    };
     // Neighbours along the contour share it.
     for (std::size_t k = i; k < std::min(i + 2, matches.size()); ++k) {
       matches[k].before = before;
       matches[k].after = after;
       matches[k].clearance = std::min(-before, after);
+      if (matches[k].limb) continue;
+      matches[k].merged = middle(same_moment, same, kSameLine);
+      matches[k].blended = near * matches[i].step > 0 ? middle(near_moment, near, 1) : 0;
     }
   }
 }
@@ -233,6 +345,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         if (normal.dot(Eigen::Vector2d(out.x() - x * out.z(), out.y() - y * out.z())) < 0)
           normal = -normal;
       }
+      match.step = static_cast<float>(match.length) * expectedStep(point, to_light);
       Eigen::Matrix<double, 2, 3> projection;
       projection << scale, 0, -scale * x, 0, scale, -scale * y;
       const Eigen::RowVector3d row = normal.transpose() * projection;
@@ -240,8 +353,18 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       match.jacobian.tail<3>() = -(row * skew(arm)).transpose();
       match.samples = std::min(1.0, match.length / kIndependentLength);
       match.place = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
-      if (point.limb > 0)
-        match.place -= static_cast<float>(params_.limb_shift) * normal.cast<float>();
+      if (point.limb > 0) {
+        const double blur = std::sqrt(std::pow(kBlurU * normal.x(), 2) +
+                                      std::pow(kBlurV * normal.y(), 2) + kSearchBlur);
+        static const LimbShift limb_shift;
+        const double lit = static_cast<double>(point.outward.dot(to_light));
+        const double spread =
+            kLampSpacing / at.norm() * (rotation * point.outward.cast<double>()).x();
+        const double shift =
+            params_.limb_darkening * blur *
+            limb_shift.at(scale * static_cast<double>(point.limb) / blur, lit, spread);
+        match.place -= static_cast<float>(shift) * normal.cast<float>();
+      }
       match.normal = normal.cast<float>();
       matches.push_back(match);
     }
@@ -339,6 +462,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           }
         }
       }
+      match.offset -= static_cast<double>(match.blended);
       if (fine && match.found && !match.limb) fit(raw, match);
       auto& support = eyes[static_cast<std::size_t>(eye)];
       support.visible += match.expected * match.length;
@@ -369,7 +493,7 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
       fitProfile(grey.data(), first, last - first + 1, blur,
                  {static_cast<double>(match.before), static_cast<double>(match.after)});
   if (!edge || std::abs(edge->offset) > kLargestShift) return;
-  match.offset = edge->offset;
+  match.offset = edge->offset - static_cast<double>(match.merged);
   match.noise = edge->noise;
   match.variance = params_.edge_sigma * params_.edge_sigma + edge->variance;
 }

@@ -18,9 +18,11 @@ struct ContourPoint {
   Eigen::Vector3f tangent;   ///< unit vector along the contour
   Eigen::Vector3f outward;  ///< off the body, where only one side of the contour is body; else zero
   float length = 0;         ///< [m] of contour that the point stands for
-  float limb = 0;           ///< 1 where a curved surface turns away, 0 at an edge of the body
-  /// Unit normals of the faces on both sides that the eye sees; zero where there is none or where
-  /// the surface is curved.
+  /// [m] radius of curvature across the contour where a curved surface turns away, 0 at an edge of
+  /// the body.
+  float limb = 0;
+  /// Unit normals of the faces that the eye sees, the first on the side of tangent x normal; zero
+  /// where there is none or where the surface is curved.
   std::array<Eigen::Vector3f, 2> faces{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
 
   bool outline() const { return outward.squaredNorm() > 0.5F; }

@@ -41,10 +41,9 @@ struct ContourParams {
   double outlier_share = 0.3;   ///< prior share of contour points that no edge supports
   double edge_sigma = 0.4;      ///< [px] noise of one sub-pixel edge
   double edge_radius = 0.0002;  ///< [m] rounding of the edges of a primitive: no body is sharp
-  /// [px] by which the limb of a curved body, lit from beside the camera, shows inside of its true
-  /// place: brightness falls to zero there with the square root of the distance, and the steepest
-  /// place of that, smoothed by a Gaussian, lies 0.77 of its deviation inside.
-  double limb_shift = 0.7;
+  /// How a curved body, lit from beside the camera, darkens where it turns away: 1 as a matt one
+  /// does (Lambert), whose limb then shows inside of its true place; 0 not at all.
+  double limb_darkening = 1;
   std::string cache_folder;  ///< views of meshes are kept here between runs; empty: nowhere
 };
 
