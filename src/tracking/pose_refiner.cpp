@@ -23,10 +23,10 @@ constexpr float kRegionPull = 1.0F;       // of the region on the choice between
 constexpr double kRegionWeight = 1.0;     // [px] beside an outline that speak independently
 constexpr double kLearningRate = 0.1;     // a frame
 constexpr double kMisfitWeight = 1.0;     // independent grey values of a profile
-constexpr double kOutlineSpread = 0.8, kCreaseSpread = 1.3;  // [px]
+constexpr double kOutlineSpread = 0.5, kCreaseSpread = 0.8;  // [px]
 // Against chance [nats]: an edge near an arbitrary place is seen about every third time, an outline
 // nearly always, a crease often not.
-constexpr double kMissedOutline = 1.5, kMissedCrease = 0.4;
+constexpr double kMissedOutline = 1.5, kMissedCrease = 0.7;
 // [px] that are searched however close the next line is: to move a pose, and to judge it, for which
 // it does not matter which of the two an edge belongs to.
 constexpr double kCrowdedRange = 0.75, kCrowdedReach = 1.6;
@@ -38,8 +38,9 @@ constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rect
 // [px^2] that smoothing, slopes by differences and bilinear interpolation add to its square.
 constexpr double kSearchBlur = 1.9;
 constexpr double kLampSpacing = 0.035;  // [m] along the baseline, the middle one between the eyes
-constexpr float kSameLine = 0.7F;       // [px]
-constexpr float kBlend = 2.9F;          // [px] lines farther apart do not blur together
+constexpr float kIgnoredCosine = 0.6F;
+constexpr float kSameLine = 0.7F;  // [px]
+constexpr float kBlend = 2.9F;     // [px] lines farther apart do not blur together
 // [px] by how much the rounding and the gloss of an edge between two visible faces may move its
 // image.
 constexpr double kCreaseDoubt = 1.2;
@@ -501,7 +502,8 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
 RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                                 const Pose& start, const PosePrior& prior,
                                 const Appearance& appearance, const std::vector<double>& ranges,
-                                const std::array<ContourView, 2>* exact) const {
+                                const std::array<ContourView, 2>* exact,
+                                const Eigen::Vector2f& ignored) const {
   RefinedPose result;
   result.camera_from_object = start;
   thread_local std::vector<Match> matches;
@@ -521,6 +523,11 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   for (const double range : ranges) {
     match(model, fields, pose, exact, range, appearance, range < kFine, kCrowdedRange, matches,
           result.eyes);
+    if (!ignored.isZero())
+      for (Match& m : matches) {
+        const float alike = m.normal.dot(ignored);
+        if ((m.outline ? alike : std::abs(alike)) > kIgnoredCosine) m.found = false;
+      }
     const double deviation = robustScale(range);
     const double limit = std::min(range + 1, 4.685 * std::max(deviation, params_.edge_sigma));
     // Edges that lie farther off than their noise says share a wrong pose, not wrong edges.

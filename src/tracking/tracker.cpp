@@ -32,6 +32,7 @@ constexpr int kHypotheses = 4;            // refined a frame
 constexpr double kPoorFit = 0.45;         // [px] of the edges' residual
 constexpr double kWorseFit = 1.25;        // times the residual of the frames before
 constexpr int kMoreHypotheses = 16;       // refined then
+constexpr int kSides = 6;                 // left out in turn then
 constexpr std::size_t kCandidates = 300;  // of the particles, to be refined
 constexpr double kCommonPixels = 0.1;     // [px] of calibration
 constexpr double kCommonShape = 8e-5;     // [m] of the object's shape
@@ -511,10 +512,23 @@ class Tracker::Impl {
             }))
           starts.push_back(pose);
       }
+      // What comes close to the object from one side may have caught that side's contour.
+      const std::size_t sided = starts.size();
+      starts.resize(sided + kSides, belief_.pose);
       refined.resize(starts.size());
       tbb::parallel_for(tried, starts.size(), [&](std::size_t i) {
-        refined[i] = refiner_.refine(model_, measurement_.fields(), starts[i], doubted, appearance_,
-                                     {8, 5, 3});
+        if (i >= sided) {
+          const double angle = 2 * M_PI * static_cast<double>(i - sided) / kSides;
+          const Eigen::Vector2f side(static_cast<float>(std::cos(angle)),
+                                     static_cast<float>(std::sin(angle)));
+          starts[i] = refiner_
+                          .refine(model_, measurement_.fields(), starts[i], doubted, appearance_,
+                                  {8, 5, 3}, nullptr, side)
+                          .camera_from_object;
+        }
+        refined[i] =
+            refiner_.refine(model_, measurement_.fields(), starts[i], doubted, appearance_,
+                            i < sided ? std::vector<double>{8, 5, 3} : std::vector<double>{4, 3});
       });
       for (const RefinedPose& candidate : refined)
         if (score(candidate) > score(best)) best = candidate;

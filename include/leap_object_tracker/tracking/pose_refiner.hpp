@@ -66,10 +66,13 @@ class PoseRefiner {
 
   /// @param ranges [px] half length of the search of each iteration
   /// @param exact views of both eyes to use instead of the model's, from a place close by
+  /// @param ignored unit vector in the image: contour that looks this way does not move the pose;
+  /// zero: all of it does
   RefinedPose refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                      const Pose& start, const PosePrior& prior, const Appearance& appearance,
                      const std::vector<double>& ranges,
-                     const std::array<ContourView, 2>* exact = nullptr) const;
+                     const std::array<ContourView, 2>* exact = nullptr,
+                     const Eigen::Vector2f& ignored = Eigen::Vector2f::Zero()) const;
 
   /// Takes the looks of the object at a pose that can be trusted into `appearance`.
   void learn(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
