@@ -236,7 +236,8 @@ class CylinderTable : public ContourModel::Table {
       const Eigen::Vector3d radial(std::cos(angle), std::sin(angle), 0);
       const Rim rim = judge(angle, radial);
       if (!rim.visible) continue;
-      all.push_back({at(angle - piece / 2), at(angle + piece / 2), rim.outward, 0, rim.faces});
+      all.push_back({at(angle - piece / 2), at(angle + piece / 2), rim.outward});
+      all.back().faces = rim.faces;
       if (!rim.outward.isZero()) continue;
       all.back().orderFaces(Eigen::Vector3d(0, 0, -end));
     }

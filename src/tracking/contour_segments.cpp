@@ -26,6 +26,7 @@ std::vector<ContourPoint> spread(const std::vector<ContourSegment>& segments, in
       point.outward = segment.outward.cast<float>();
       point.length = static_cast<float>(step);
       point.limb = static_cast<float>(segment.limb);
+      point.inner = segment.inner ? 1.0F : 0.0F;
       for (std::size_t side = 0; side < 2; ++side)
         point.faces[side] = segment.faces[side].cast<float>();
       points.push_back(point);

@@ -14,6 +14,7 @@ struct ContourSegment {
   Eigen::Vector3d start, end;
   Eigen::Vector3d outward;  ///< as in ContourPoint
   double limb = 0;          ///< as in ContourPoint
+  bool inner = false;       ///< as in ContourPoint
   /// As in ContourPoint.
   std::array<Eigen::Vector3d, 2> faces{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
 

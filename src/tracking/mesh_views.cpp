@@ -35,6 +35,7 @@ constexpr double kClearance = 1.03;   ///< no eye is nearer to the convex hull, 
 constexpr double kSharp = 30 * M_PI / 180;   ///< [rad] between normals; more is a crease
 constexpr double kFlat = 0.05 * M_PI / 180;  ///< [rad] less is no edge at all
 constexpr double kPieceAngle = 1.5 / 120;    ///< length of a piece [radii], seen across
+constexpr double kBeside = 0.02;             ///< of an outline is looked for other parts [radii]
 constexpr double kOffSurface = 1e-4;  ///< where rays start [radii], to miss their own surface
 
 /// Vertices of an icosahedron whose triangles are split in four, three times: 642 directions, about
@@ -133,7 +134,7 @@ class ContourFinder {
 
   std::vector<ContourSegment> segmentsFrom(const Vector3d& eye) const {
     std::vector<ContourSegment> segments;
-    std::uint32_t blocker = 0;
+    std::uint32_t blocker = 0, backdrop = 0;  // hit last: likely to be hit again
     for (std::size_t patch = 0; patch < patches_.size(); ++patch) {
       if (patches_[patch].looksOneWay(eye)) continue;
       const std::size_t first = patch * kPatchEdges;
@@ -141,7 +142,8 @@ class ContourFinder {
         const Sides& sides = sides_[i];
         const bool outline =
             (facesEye(sides.first, eye) != facesEye(sides.second, eye)) != sides.flipped;
-        if (outline || sides.always) addVisible(edges_[i], outline, eye, blocker, segments);
+        if (outline || sides.always)
+          addVisible(edges_[i], outline, eye, blocker, backdrop, segments);
       }
     }
     return segments;
@@ -302,7 +304,7 @@ class ContourFinder {
 
   /// Cuts an edge into pieces short enough to be wholly visible or wholly hidden.
   void addVisible(const Edge& edge, bool outline, const Vector3d& eye, std::uint32_t& blocker,
-                  std::vector<ContourSegment>& segments) const {
+                  std::uint32_t& backdrop, std::vector<ContourSegment>& segments) const {
     const Vector3d along = edge.end - edge.start;
     const Vector3d to_eye = eye - (edge.start + edge.end) / 2;
     const double seen_across = along.cross(to_eye).norm() / to_eye.norm();
@@ -317,11 +319,18 @@ class ContourFinder {
       const Vector3d free = freeSide(edge, outline, ray);
       const Vector3d from = middle + kOffSurface * radius_ * (free + ray);
       if (sight_.blocked(from.cast<float>(), eye.cast<float>(), blocker)) continue;
+      bool inner = false;
+      if (outline) {
+        const Vector3d beside = middle + kBeside * radius_ * awayInImage(edge, ray);
+        const Vector3d behind = beside - 4 * radius_ * ray;
+        inner = sight_.blocked(beside.cast<float>(), behind.cast<float>(), backdrop);
+      }
       if (outline && edge.kind == Kind::kSmooth) {
-        addLimb(edge, start, end, ray, segments);
+        addLimb(edge, start, end, ray, inner, segments);
         continue;
       }
       ContourSegment segment{start, end, outline ? awayFromFace(edge, ray) : Vector3d::Zero()};
+      segment.inner = inner;
       for (std::size_t side = 0; side < 2; ++side) {
         if (side == 1 && edge.kind == Kind::kOpen) continue;
         const Vector3d& normal = normals_[edge.triangles[side]];
@@ -364,7 +373,7 @@ class ContourFinder {
   /// A piece of the outline of a curved surface: the edges run zigzag about the true limb, which is
   /// normal to the ray and to the surface where that turns away.
   void addLimb(const Edge& edge, const Vector3d& start, const Vector3d& end, const Vector3d& ray,
-               std::vector<ContourSegment>& segments) const {
+               bool inner, std::vector<ContourSegment>& segments) const {
     const Vector3d& first = normals_[edge.triangles[0]];
     const Vector3d second = (edge.opposed ? -1 : 1) * normals_[edge.triangles[1]];
     // Between the two normals, where it is across the ray.
@@ -379,7 +388,8 @@ class ContourFinder {
     // Facets as wide as the edge is from their far corners.
     const double width = 0.5 * (offEdge(edge, 0) + offEdge(edge, 1));
     const double bend = std::atan2(first.cross(second).norm(), first.dot(second));
-    segments.push_back({middle - half, middle + half, outward, std::max(1e-6, width / bend)});
+    segments.push_back(
+        {middle - half, middle + half, outward, std::max(1e-6, width / bend), inner});
   }
 
   /// [m] from an edge to the far corner of a triangle.
@@ -489,8 +499,8 @@ class ViewFile {
   }
 
  private:
-  static constexpr std::uint64_t kVersion = 6;  ///< of the format and of how views are found
-  static_assert(sizeof(ContourPoint) == 17 * sizeof(float), "written as bytes, without gaps");
+  static constexpr std::uint64_t kVersion = 7;  ///< of the format and of how views are found
+  static_assert(sizeof(ContourPoint) == 18 * sizeof(float), "written as bytes, without gaps");
 
   template <class T>
   static void put(const T* values, std::size_t count, std::vector<char>& bytes) {

@@ -30,6 +30,7 @@ constexpr double kMissedOutline = 1.5, kMissedCrease = 0.7;
 // [px] that are searched however close the next line is: to move a pose, and to judge it, for which
 // it does not matter which of the two an edge belongs to.
 constexpr double kCrowdedRange = 0.75, kCrowdedReach = 1.6;
+constexpr double kInnerContrast = 0.5;  // of an outline before another part of the body, likewise
 constexpr double kSureContrast = 0.25;  // of the brightest, that an edge shows without fail
 constexpr double kFine = 2.6;           // [px] ranges below this are searched by fitted steps
 constexpr int kProfile = 7;             // [px] half length of a profile that steps are fitted to
@@ -114,6 +115,7 @@ Twist cameraTwistBetween(const Pose& from, const Pose& to) {
 /// brightness goes with the cosine of the angle at which they are seen (Lambert); nothing can be
 /// said of curved ones.
 static double expectedContrast(const ContourPoint& point, const Eigen::Vector3f& to_light) {
+  if (point.inner > 0) return kInnerContrast;
   float contrast = 0;
   for (const auto& face : point.faces)
     contrast += (&face == &point.faces[0] ? 1.0F : -1.0F) * std::max(0.0F, face.dot(to_light));
@@ -130,6 +132,7 @@ static float expectedStep(const ContourPoint& point, const Eigen::Vector3f& to_l
   const auto brightness = [&](std::size_t face) {
     return std::max(0.0F, point.faces[face].dot(to_light));
   };
+  if (point.inner > 0) return 0;  // as bright as what lies behind
   if (point.limb > 0) return -kLimb;
   if (point.outline()) return -std::max(kLeastOutline, brightness(0) + brightness(1));
   return brightness(0) - brightness(1);
@@ -336,12 +339,12 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       Match match;
       match.eye = eye;
       match.length = stretch * point.length;
-      match.outline = point.outline();
+      match.outline = point.outline() && !(point.inner > 0);
       match.limb = point.limb > 0;
       const Eigen::Vector3f to_light =
           (rotation.transpose() * (light - at)).normalized().cast<float>();
       match.expected = expectedContrast(point, to_light);
-      if (match.outline) {
+      if (point.outline()) {
         const Eigen::Vector3d out = rotation * point.outward.cast<double>();
         if (normal.dot(Eigen::Vector2d(out.x() - x * out.z(), out.y() - y * out.z())) < 0)
           normal = -normal;
@@ -354,7 +357,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       match.jacobian.tail<3>() = -(row * skew(arm)).transpose();
       match.samples = std::min(1.0, match.length / kIndependentLength);
       match.place = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
-      if (point.limb > 0) {
+      if (point.limb > 0 && match.outline) {
         const double blur = std::sqrt(std::pow(kBlurU * normal.x(), 2) +
                                       std::pow(kBlurV * normal.y(), 2) + kSearchBlur);
         static const LimbShift limb_shift;

@@ -21,6 +21,7 @@ struct ContourPoint {
   /// [m] radius of curvature across the contour where a curved surface turns away, 0 at an edge of
   /// the body.
   float limb = 0;
+  float inner = 0;  ///< 1 where an outline lies before another part of the body
   /// Unit normals of the faces that the eye sees, the first on the side of tangent x normal; zero
   /// where there is none or where the surface is curved.
   std::array<Eigen::Vector3f, 2> faces{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
