@@ -40,8 +40,9 @@ constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rect
 constexpr double kSearchBlur = 1.9;
 constexpr double kLampSpacing = 0.035;  // [m] along the baseline, the middle one between the eyes
 constexpr float kIgnoredCosine = 0.6F;
-constexpr float kSameLine = 0.7F;  // [px]
-constexpr float kBlend = 2.9F;     // [px] lines farther apart do not blur together
+constexpr float kSameLine = 0.7F;                   // [px]
+constexpr float kOneLine = 0.25F, kUnresolved = 2;  // [px]
+constexpr float kBlend = 2.9F;                      // [px] lines farther apart do not blur together
 // [px] by how much the rounding and the gloss of an edge between two visible faces may move its
 // image.
 constexpr double kCreaseDoubt = 1.2;
@@ -246,16 +247,17 @@ struct PoseRefiner::Match {
 /// How far another line of the contour runs beside each: an edge between the two belongs to the
 /// nearer. Looks at the matches from `first` on.
 void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches) {
-  thread_local std::vector<std::array<float, 5>> lines;
+  thread_local std::vector<std::array<float, 6>> lines;
   lines.clear();
   for (std::size_t j = first; j < matches.size(); j += 2)
     lines.push_back({matches[j].place.x(), matches[j].place.y(), matches[j].normal.x(),
-                     matches[j].normal.y(), matches[j].step});
+                     matches[j].normal.y(), matches[j].step,
+                     static_cast<float>(matches[j].length)});
   for (std::size_t i = first; i < matches.size(); i += 2) {
     const float u = matches[i].place.x(), v = matches[i].place.y();
     const float nu = matches[i].normal.x(), nv = matches[i].normal.y();
     float before = -kClearance, after = kClearance;
-    float same = 0, same_moment = 0, near = 0, near_moment = 0;
+    float same = 0, same_moment = 0, near = 0, near_moment = 0, own = 0, all = 0;
     for (const auto& line : lines) {
       const float du = line[0] - u, dv = line[1] - v;
       const float across = nu * du + nv * dv, parallel = nu * line[2] + nv * line[3];
@@ -270,6 +272,10 @@ void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches)
       same_moment += on_line * across;
       near += blurred;
       near_moment += blurred * across;
+      const float length = beside ? line[5] : 0;
+      const float alike = std::max(0.0F, 1 - across * across * (1 / (kUnresolved * kUnresolved)));
+      own += std::abs(across) < kOneLine ? length : 0;
+      all += length * alike * alike;
     }
     const auto middle = [](float moment, float sum, float limit) {
       return std::abs(sum) > 1e-3F ? std::clamp(moment / sum, -limit, limit) : 0.0F;
@@ -279,6 +285,8 @@ void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches)
       matches[k].before = before;
       matches[k].after = after;
       matches[k].clearance = std::min(-before, after);
+      // Lines that the image does not tell apart are seen once.
+      if (own > 0) matches[k].samples *= static_cast<double>(std::min(1.0F, own / all));
       if (matches[k].limb) continue;
       matches[k].merged = middle(same_moment, same, kSameLine);
       matches[k].blended = near * matches[i].step > 0 ? middle(near_moment, near, 1) : 0;
