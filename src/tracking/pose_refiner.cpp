@@ -569,7 +569,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
         result.eyes);
   const double deviation = robustScale(last_range);
   result.residual = deviation;
-  double bright = 0, judged = 0;
+  double bright = 0, judged = 0, found = 0;
   for (const Match& m : matches) {
     const double missed = m.expected * (m.outline ? kMissedOutline : kMissedCrease);
     double gain = -missed;
@@ -577,6 +577,8 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
       const double weight = tukeyWeight(m.offset, 4.685 * std::max(deviation, params_.edge_sigma));
       result.information.noalias() += kIndependentErrors * weight * m.samples / m.variance *
                                       m.jacobian * m.jacobian.transpose();
+      found += weight * m.samples;
+      result.leverage.noalias() += weight * m.samples * m.jacobian * m.jacobian.transpose();
       if (m.outline && std::abs(m.offset) < kSupportDistance) {
         judged += m.length;
         if (m.bright_inside) bright += m.length;
@@ -587,6 +589,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     result.log_likelihood +=
         m.samples * gain + kRegionWeight * m.expected * m.samples * static_cast<double>(m.region);
   }
+  if (found > 0) result.leverage /= found;
   result.evidence = result.log_likelihood;
   // Lines that the model lacks or has too many spoil the fits; points without a fit do not count.
   // It is the outline that weighs them: poses that show more creases are not worse for it.

@@ -35,10 +35,13 @@ constexpr int kMoreHypotheses = 16;       // refined then
 constexpr int kSides = 6;                 // left out in turn then
 constexpr std::size_t kCandidates = 300;  // of the particles, to be refined
 constexpr double kCommonPixels = 0.1;     // [px] of calibration
+constexpr double kCommonLines = 5;        // of the contour that err each for itself
 constexpr double kCommonShape = 8e-5;     // [m] of the object's shape
 constexpr double kUnknownSpin = 0.25;     // [rad] of a free axis that nothing binds
 constexpr double kDoubtShare = 0.3;       // of the particles, drawn as if the last pose were wrong
 constexpr double kDoubtReach = 4;         // [px] by which it then lies off
+constexpr double kFarthestTurn = 0.4;     // [rad] of a pose that is least bound
+constexpr double kClearlyBetter = 8;      // [nats] by which such a pose must be better
 constexpr double kDoubtCost = 5;          // [nats] against a pose that says so
 constexpr double kLeastSupport = 0.40;    // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
@@ -125,17 +128,15 @@ class Tracker::Impl {
   }
 
   void start(const Pose& camera_from_object) {
-    belief_ = beliefAt(camera_from_object, params_.start.position_sigma,
-                       params_.start.rotation_sigma_deg * M_PI / 180);
-    initializeFilter();
+    begin(beliefAt(camera_from_object, params_.start.position_sigma,
+                   params_.start.rotation_sigma_deg * M_PI / 180),
+          false);
+    beginLooks(0.5);
     report_.state = TrackerState::kTracking;
-    weak_frames_ = 0;
-    fresh_ = true;
     confirming_ = false;
     last_seen_.reset();
     remembered_.reset();
     last_stamp_.reset();
-    features_.restart(false);
   }
 
   void search() {
@@ -247,9 +248,7 @@ class Tracker::Impl {
       return;
     }
     takeUp(known.value_or(asLastSeen(found->camera_from_object)), frame.stamp, known.has_value());
-    tracked_frames_ = turned_votes_ = 0;
-    appearance_ = {};
-    appearance_.bright_inside = std::clamp(found->bright_inside, 0.3, 0.9);
+    beginLooks(std::clamp(found->bright_inside, 0.3, 0.9));
   }
 
   /// Whether a pose that was searched for may be the object's.
@@ -304,15 +303,28 @@ class Tracker::Impl {
 
   /// A pose that must prove itself in the next frame.
   void takeUp(const Pose& pose, Stamp stamp, bool sure) {
-    belief_ = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
+    begin(beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma), sure);
+    last_stamp_ = stamp;
+    confirming_ = true;
+  }
+
+  /// Forgets what belongs to an earlier track.
+  void begin(const PoseBelief& belief, bool sure) {
+    belief_ = belief;
     initializeFilter();
     features_.restart(sure);
     usual_residual_ = 0;
     frames_to_opinion_ = opinion_period_ = kFirstOpinion;
-    last_stamp_ = stamp;
     weak_frames_ = 0;
+    leverage_.setZero();
     fresh_ = true;
-    confirming_ = true;
+  }
+
+  /// Nothing is known yet of how the object looks.
+  void beginLooks(double bright_inside) {
+    tracked_frames_ = turned_votes_ = 0;
+    appearance_ = {};
+    appearance_.bright_inside = bright_inside;
   }
 
   void initializeFilter() {
@@ -388,6 +400,20 @@ class Tracker::Impl {
   Matrix6d common(const Pose& pose) const {
     const double depth = std::max(0.03, pose.translation().z());
     const double error = std::hypot(kCommonPixels * depth / camera_.focal_length, kCommonShape);
+    if (!leverage_.isZero()) {
+      // Of so many lines, each is off by an error of its own.
+      const double pixels = error * camera_.focal_length / depth;
+      Twist most;
+      most << Eigen::Vector3d::Constant(0.2 * depth), Eigen::Vector3d::Constant(0.3);
+      Matrix6d information = leverage_ * (kCommonLines / (pixels * pixels));
+      information.diagonal() += most.cwiseAbs2().cwiseInverse();
+      if (object_.symmetry.hasFreeAxis()) {  // the contour does not show it
+        Twist spin = Twist::Zero();
+        spin.tail<3>() = pose.linear() * object_.symmetry.free_axis;
+        information += std::pow(model_.radius() / error, 2) * spin * spin.transpose();
+      }
+      return information.inverse();
+    }
     const double along = error * std::clamp(0.5 * depth / model_.radius(), 1.0, 5.0);
     const double turn = error / model_.radius();
     Twist deviation;
@@ -404,6 +430,25 @@ class Tracker::Impl {
     Twist deviation;
     deviation << reach, reach, along, turn, turn, turn;
     return deviation.cwiseAbs2().asDiagonal();
+  }
+
+  /// The two poses that differ most from one while the contour moves by a few pixels.
+  std::array<Pose, 2> leastBound(const RefinedPose& pose) const {
+    Twist scale;  // rotations as what they move
+    scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(1 / model_.radius());
+    Matrix6d leverage = scale.asDiagonal() * pose.leverage * scale.asDiagonal();
+    if (object_.symmetry.hasFreeAxis()) {
+      Twist spin = Twist::Zero();
+      spin.tail<3>() = pose.camera_from_object.linear() * object_.symmetry.free_axis;
+      leverage += leverage.trace() * spin * spin.transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(leverage);
+    const double length =
+        std::min(kFarthestTurn * model_.radius(),
+                 kDoubtReach / std::sqrt(std::max(1e-9, solver.eigenvalues()[0])));
+    const Twist step = length * scale.asDiagonal() * solver.eigenvectors().col(0);
+    return {movedInCamera(pose.camera_from_object, step),
+            movedInCamera(pose.camera_from_object, -step)};
   }
 
   void scoreParticles() {
@@ -533,6 +578,17 @@ class Tracker::Impl {
       for (const RefinedPose& candidate : refined)
         if (score(candidate) > score(best)) best = candidate;
     }
+    if (!best.leverage.isZero()) {
+      const std::array<Pose, 2> other = leastBound(best);
+      std::array<RefinedPose, 2> tried;
+      tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
+        tried[i] = refiner_.refine(model_, measurement_.fields(), other[i], doubted, appearance_,
+                                   {5, 3.5, 2.5});
+      });
+      const double least = score(best) + kClearlyBetter;
+      for (const RefinedPose& candidate : tried)
+        if (score(candidate) > std::max(least, score(best))) best = candidate;
+    }
     const bool use_features = features_.speak() && score(by_features) >= score(best);
     if (use_features) best = by_features;
     const bool likely = expected(best.camera_from_object);
@@ -620,6 +676,7 @@ class Tracker::Impl {
       if (report_.support < kFoundSupport && landmark_support < kLandmarkSupport) return;
     }
     if (supported) {
+      leverage_ = refined.leverage;
       belief_.update(refined.camera_from_object, refined.information);
       usual_residual_ = usual_residual_ > 0
                             ? usual_residual_ + 0.1 * (refined.residual - usual_residual_)
@@ -658,7 +715,8 @@ class Tracker::Impl {
   Appearance appearance_;
   std::vector<std::uint32_t> order_;  ///< of the particles, the best ones first
   int weak_frames_ = 0;
-  double usual_residual_ = 0;  ///< [px]
+  double usual_residual_ = 0;             ///< [px]
+  Matrix6d leverage_ = Matrix6d::Zero();  ///< of the last supported pose
   int frames_to_opinion_ = kFirstOpinion, opinion_period_ = kFirstOpinion;
   int frames_lost_ = 0;
   bool fresh_ = false;

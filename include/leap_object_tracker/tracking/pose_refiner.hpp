@@ -35,6 +35,9 @@ struct EyeSupport {
 struct RefinedPose {
   Pose camera_from_object = Pose::Identity();
   Matrix6d information = Matrix6d::Zero();  ///< of the image alone, of the camera twist
+  /// Mean over the contour that was found of the squared Jacobian of its place across it [px^2], by
+  /// the camera twist: how far the contour moves with the pose, whatever the noise.
+  Matrix6d leverage = Matrix6d::Zero();
   std::array<EyeSupport, 2> eyes;
   double residual = 0;  ///< [px] robust standard deviation of the edges about the contour
   double bright_inside =
