@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "leap_object_tracker/tracking/edge_profile.hpp"
+#include "line_neighbours.hpp"
 
 namespace leap_object_tracker {
 namespace {
@@ -16,8 +17,6 @@ constexpr double kIndependentLength = 3;  // [px] of contour that one independen
 constexpr double kSupportDistance = 1.5;  // [px]
 constexpr float kVisibleSlope = 3;        // [noise] of an edge that is taken for one
 constexpr int kLongestRange = 24;         // [px]
-constexpr float kClearance = 16;          // [px] lines farther apart do not disturb each other
-constexpr float kAlongside = 4;           // [px]
 constexpr int kRegionReach = 5;           // [px] on either side of an outline that is looked at
 constexpr float kRegionPull = 1.0F;       // of the region on the choice between edges
 constexpr double kRegionWeight = 1.0;     // [px] beside an outline that speak independently
@@ -40,9 +39,6 @@ constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rect
 constexpr double kSearchBlur = 1.9;
 constexpr double kLampSpacing = 0.035;  // [m] along the baseline, the middle one between the eyes
 constexpr float kIgnoredCosine = 0.6F;
-constexpr float kSameLine = 0.7F;                   // [px]
-constexpr float kOneLine = 0.25F, kUnresolved = 2;  // [px]
-constexpr float kBlend = 2.9F;                      // [px] lines farther apart do not blur together
 // [px] by how much the rounding and the gloss of an edge between two visible faces may move its
 // image.
 constexpr double kCreaseDoubt = 1.2;
@@ -230,8 +226,9 @@ struct PoseRefiner::Match {
   float step = 0;                 ///< expectedStep() along the normal, times the length
   float merged = 0;               ///< [px] along the normal to where lines on one place show
   float blended = 0;              ///< [px] the same for lines that blur together
-  float before = -kClearance;     ///< [px] where the next line against the normal is crossed
-  float after = kClearance;       ///< [px] the same along the normal
+  float before =
+      -ContourLines::kFarthest;  ///< [px] where the next line against the normal is crossed
+  float after = ContourLines::kFarthest;  ///< [px] the same along the normal
   int eye = 0;
   bool found = false;
   bool outline = false;
@@ -247,49 +244,30 @@ struct PoseRefiner::Match {
 /// How far another line of the contour runs beside each: an edge between the two belongs to the
 /// nearer. Looks at the matches from `first` on.
 void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches) {
-  thread_local std::vector<std::array<float, 6>> lines;
+  thread_local ContourLines lines;
   lines.clear();
-  for (std::size_t j = first; j < matches.size(); j += 2)
-    lines.push_back({matches[j].place.x(), matches[j].place.y(), matches[j].normal.x(),
-                     matches[j].normal.y(), matches[j].step,
-                     static_cast<float>(matches[j].length)});
+  for (std::size_t j = first; j < matches.size(); j += 2) {
+    const Match& m = matches[j];
+    lines.add(m.place.x(), m.place.y(), m.normal.x(), m.normal.y(), m.step,
+              static_cast<float>(m.length));
+  }
   for (std::size_t i = first; i < matches.size(); i += 2) {
-    const float u = matches[i].place.x(), v = matches[i].place.y();
-    const float nu = matches[i].normal.x(), nv = matches[i].normal.y();
-    float before = -kClearance, after = kClearance;
-    float same = 0, same_moment = 0, near = 0, near_moment = 0, own = 0, all = 0;
-    for (const auto& line : lines) {
-      const float du = line[0] - u, dv = line[1] - v;
-      const float across = nu * du + nv * dv, parallel = nu * line[2] + nv * line[3];
-      const bool beside = (std::abs(nu * dv - nv * du) < kAlongside) & (std::abs(parallel) > 0.8F);
-      before = beside && across < -kSameLine && across > before ? across : before;
-      after = beside && across > kSameLine && across < after ? across : after;
-      const float step = !beside ? 0 : parallel > 0 ? line[4] : -line[4];
-      const float on_line = std::abs(across) < kSameLine ? step : 0;
-      const float share = std::max(0.0F, 1 - across * across * (1 / (kBlend * kBlend)));
-      const float blurred = step * share * share;
-      same += on_line;
-      same_moment += on_line * across;
-      near += blurred;
-      near_moment += blurred * across;
-      const float length = beside ? line[5] : 0;
-      const float alike = std::max(0.0F, 1 - across * across * (1 / (kUnresolved * kUnresolved)));
-      own += std::abs(across) < kOneLine ? length : 0;
-      all += length * alike * alike;
-    }
+    const ContourLines::Neighbours beside = lines.neighbours((i - first) / 2);
     const auto middle = [](float moment, float sum, float limit) {
       return std::abs(sum) > 1e-3F ? std::clamp(moment / sum, -limit, limit) : 0.0F;
     };
     // Neighbours along the contour share it.
     for (std::size_t k = i; k < std::min(i + 2, matches.size()); ++k) {
-      matches[k].before = before;
-      matches[k].after = after;
-      matches[k].clearance = std::min(-before, after);
+      matches[k].before = beside.before;
+      matches[k].after = beside.after;
+      matches[k].clearance = std::min(-beside.before, beside.after);
       // Lines that the image does not tell apart are seen once.
-      if (own > 0) matches[k].samples *= static_cast<double>(std::min(1.0F, own / all));
+      if (beside.own > 0)
+        matches[k].samples *= static_cast<double>(std::min(1.0F, beside.own / beside.all));
       if (matches[k].limb) continue;
-      matches[k].merged = middle(same_moment, same, kSameLine);
-      matches[k].blended = near * matches[i].step > 0 ? middle(near_moment, near, 1) : 0;
+      matches[k].merged = middle(beside.same_moment, beside.same, ContourLines::kSameLine);
+      matches[k].blended =
+          beside.near * matches[i].step > 0 ? middle(beside.near_moment, beside.near, 1) : 0;
     }
   }
 }

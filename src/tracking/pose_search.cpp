@@ -19,6 +19,7 @@ constexpr double kWorstArea = 1.4;  // log of the ratio to the object's largest 
 constexpr double kDoubtOfOneEye = 0.5, kDoubtOfClosing = 0.1;
 constexpr double kTrustOfContrast = 0.3;   // a doubling of the thresholds that a region stands
 constexpr std::size_t kTurned = 24;        // of the turned poses that are refined
+constexpr float kNearest = 0.02F;          // [m] of any part of a pose
 constexpr int kHullPoints = 64;            // of the contour, for how far it reaches
 constexpr float kFewestDirections = 6;     // in which a region's reach must be known
 constexpr float kLeastGrowth = 0.7F;       // of the projection, to fit a region
@@ -215,9 +216,9 @@ std::vector<PoseSearch::Place> PoseSearch::findPlaces(const RectifiedStereoFrame
   return chosen;
 }
 
-/// What one eye sees of the first `points` of the contour at a pose.
-std::optional<PoseSearch::Glance> PoseSearch::glance(const ParticlePose& pose, double eye_x,
-                                                     int points, bool extents) const {
+/// What one eye sees of the first `points` of the contour at a pose, its length in pixels.
+std::optional<ContourReach> PoseSearch::glance(const ParticlePose& pose, double eye_x,
+                                               int points) const {
   using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
   const Eigen::Map<const RowMajor> object_rotation(pose.rotation.data());
   const Eigen::Vector3f origin(pose.translation[0] - static_cast<float>(eye_x), pose.translation[1],
@@ -229,30 +230,16 @@ std::optional<PoseSearch::Glance> PoseSearch::glance(const ParticlePose& pose, d
   turn(0, 1) = -choice.sine;
   turn(1, 0) = choice.sine;
   const Eigen::Matrix3f rotation = object_rotation * turn;
-  const auto count = static_cast<std::size_t>(model_->points());
-  const float* values = choice.view->arrays.data();
-  const auto column = [&](std::size_t first, std::size_t i) {
-    return Eigen::Vector3f(values[first * count + i], values[(first + 1) * count + i],
-                           values[(first + 2) * count + i]);
-  };
-  Glance seen;
-  seen.extents.setConstant(-1e9F);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(points); ++i) {
-    const Eigen::Vector3f at = origin + rotation * column(0, i);
-    if (at.z() < 0.02F) return std::nullopt;
-    const Eigen::Array2f slope = at.head<2>().array() / at.z();
-    if (extents)
-      seen.extents =
-          seen.extents.max(BrightRegion::cosines() * slope.x() + BrightRegion::sines() * slope.y());
-    const Eigen::Vector3f along = rotation * column(3, i);
-    seen.length += (along.head<2>().array() - slope * along.z()).matrix().norm() / at.z();
-  }
+  ContourReach seen =
+      reachOfContour(choice.view->arrays.data(), static_cast<std::size_t>(model_->points()),
+                     static_cast<std::size_t>(points), origin, rotation, kNearest);
+  if (!seen.in_front) return std::nullopt;
   seen.length *= static_cast<float>(camera_.focal_length);
   return seen;
 }
 
 /// [nats] by which the reach of a region speaks against a pose.
-float PoseSearch::hullDoubt(const Glance& seen, const BrightRegion& region) const {
+float PoseSearch::hullDoubt(const ContourReach& seen, const BrightRegion& region) const {
   const auto focal = static_cast<float>(camera_.focal_length);
   const BrightRegion::Extents apart =
       region.extents - focal * seen.extents -
@@ -267,8 +254,8 @@ float PoseSearch::hullDoubt(const Glance& seen, const BrightRegion& region) cons
 /// Moves a pose until its outline reaches as far as the region in all directions, as well as can be
 /// with a shift in the image and another depth: least squares of the extents.
 std::optional<Pose> PoseSearch::fitToRegion(const Pose& pose, const Place& place) const {
-  const std::optional<Glance> seen =
-      glance(toParticlePose(pose), place.eye_x, std::min(kHullPoints, model_->points()), true);
+  const std::optional<ContourReach> seen =
+      glance(toParticlePose(pose), place.eye_x, std::min(kHullPoints, model_->points()));
   if (!seen) return std::nullopt;
   using Extents = BrightRegion::Extents;
   const Extents &c = BrightRegion::cosines(), &s = BrightRegion::sines();
@@ -329,8 +316,7 @@ void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses, int points,
                                       &hypothesis.pose, 1, &hypothesis.score);
                         const Place* place =
                             hypothesis.place < places.size() ? &places[hypothesis.place] : nullptr;
-                        const auto seen = glance(hypothesis.pose, place ? place->eye_x : 0, points,
-                                                 place != nullptr);
+                        const auto seen = glance(hypothesis.pose, place ? place->eye_x : 0, points);
                         if (!seen) continue;
                         hypothesis.score -= kToBeExpected * kBlunt.log_ratio * kIndependentShare *
                                             seen->length * static_cast<float>(eye_count);

@@ -40,6 +40,7 @@ constexpr double kCommonShape = 8e-5;     // [m] of the object's shape
 constexpr double kUnknownSpin = 0.25;     // [rad] of a free axis that nothing binds
 constexpr double kDoubtShare = 0.3;       // of the particles, drawn as if the last pose were wrong
 constexpr double kDoubtReach = 4;         // [px] by which it then lies off
+constexpr double kLeastTurn = 0.15;       // [rad] of a least bound direction that is doubtful
 constexpr double kFarthestTurn = 0.4;     // [rad] of a pose that is least bound
 constexpr double kClearlyBetter = 8;      // [nats] by which such a pose must be better
 constexpr double kDoubtCost = 5;          // [nats] against a pose that says so
@@ -432,23 +433,33 @@ class Tracker::Impl {
     return deviation.cwiseAbs2().asDiagonal();
   }
 
-  /// The two poses that differ most from one while the contour moves by a few pixels.
-  std::array<Pose, 2> leastBound(const RefinedPose& pose) const {
+  /// The image hardly tells a pose from others along the direction that moves its contour least:
+  /// one of those takes its place if it is clearly better.
+  template <class Score>
+  void tryLeastBound(const PosePrior& prior, const Score& score, RefinedPose& best) const {
     Twist scale;  // rotations as what they move
     scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(1 / model_.radius());
-    Matrix6d leverage = scale.asDiagonal() * pose.leverage * scale.asDiagonal();
+    Matrix6d leverage = scale.asDiagonal() * best.leverage * scale.asDiagonal();
     if (object_.symmetry.hasFreeAxis()) {
       Twist spin = Twist::Zero();
-      spin.tail<3>() = pose.camera_from_object.linear() * object_.symmetry.free_axis;
+      spin.tail<3>() = best.camera_from_object.linear() * object_.symmetry.free_axis;
       leverage += leverage.trace() * spin * spin.transpose();
     }
     const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(leverage);
-    const double length =
-        std::min(kFarthestTurn * model_.radius(),
-                 kDoubtReach / std::sqrt(std::max(1e-9, solver.eigenvalues()[0])));
-    const Twist step = length * scale.asDiagonal() * solver.eigenvectors().col(0);
-    return {movedInCamera(pose.camera_from_object, step),
-            movedInCamera(pose.camera_from_object, -step)};
+    const double turn =
+        kDoubtReach / std::sqrt(std::max(1e-9, solver.eigenvalues()[0])) / model_.radius();
+    if (best.leverage.isZero() || turn < kLeastTurn) return;
+    const Twist step = std::min(turn, kFarthestTurn) * model_.radius() * scale.asDiagonal() *
+                       solver.eigenvectors().col(0);
+    std::array<RefinedPose, 2> tried;
+    tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
+      const Pose other = movedInCamera(best.camera_from_object, i == 0 ? step : Twist(-step));
+      tried[i] =
+          refiner_.refine(model_, measurement_.fields(), other, prior, appearance_, {5, 3.5, 2.5});
+    });
+    const double least = score(best) + kClearlyBetter;
+    for (const RefinedPose& candidate : tried)
+      if (score(candidate) > std::max(least, score(best))) best = candidate;
   }
 
   void scoreParticles() {
@@ -578,17 +589,7 @@ class Tracker::Impl {
       for (const RefinedPose& candidate : refined)
         if (score(candidate) > score(best)) best = candidate;
     }
-    if (!best.leverage.isZero()) {
-      const std::array<Pose, 2> other = leastBound(best);
-      std::array<RefinedPose, 2> tried;
-      tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
-        tried[i] = refiner_.refine(model_, measurement_.fields(), other[i], doubted, appearance_,
-                                   {5, 3.5, 2.5});
-      });
-      const double least = score(best) + kClearlyBetter;
-      for (const RefinedPose& candidate : tried)
-        if (score(candidate) > std::max(least, score(best))) best = candidate;
-    }
+    tryLeastBound(doubted, score, best);
     const bool use_features = features_.speak() && score(by_features) >= score(best);
     if (use_features) best = by_features;
     const bool likely = expected(best.camera_from_object);

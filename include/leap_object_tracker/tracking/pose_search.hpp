@@ -11,6 +11,7 @@
 #include "leap_object_tracker/tracking/bright_regions.hpp"
 #include "leap_object_tracker/tracking/contour_kernel.hpp"
 #include "leap_object_tracker/tracking/contour_model.hpp"
+#include "leap_object_tracker/tracking/contour_reach.hpp"
 #include "leap_object_tracker/tracking/edge_field.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/tracker_params.hpp"
@@ -62,13 +63,8 @@ class PoseSearch {
   };
 
   std::vector<Place> findPlaces(const RectifiedStereoFrame& frame) const;
-  struct Glance {
-    BrightRegion::Extents extents;  ///< largest c x / z + s y / z, by direction
-    float length = 0;               ///< [px] of contour
-  };
-  std::optional<Glance> glance(const ParticlePose& pose, double eye_x, int points,
-                               bool extents) const;
-  float hullDoubt(const Glance& seen, const BrightRegion& region) const;
+  std::optional<ContourReach> glance(const ParticlePose& pose, double eye_x, int points) const;
+  float hullDoubt(const ContourReach& seen, const BrightRegion& region) const;
   std::optional<Pose> fitToRegion(const Pose& pose, const Place& place) const;
   std::vector<Hypothesis> distinct(std::vector<Hypothesis>& hypotheses, std::size_t count,
                                    double apart) const;
