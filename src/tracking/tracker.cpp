@@ -40,6 +40,7 @@ constexpr double kCommonShape = 8e-5;     // [m] of the object's shape
 constexpr double kUnknownSpin = 0.25;     // [rad] of a free axis that nothing binds
 constexpr double kDoubtShare = 0.3;       // of the particles, drawn as if the last pose were wrong
 constexpr double kDoubtReach = 4;         // [px] by which it then lies off
+constexpr double kLeastTurn = 0.15;       // [rad] of a least bound direction that is doubtful
 constexpr double kFarthestTurn = 0.4;     // [rad] of a pose that is least bound
 constexpr double kClearlyBetter = 8;      // [nats] by which such a pose must be better
 constexpr double kDoubtCost = 5;          // [nats] against a pose that says so
@@ -447,7 +448,7 @@ class Tracker::Impl {
     const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(leverage);
     const double turn =
         kDoubtReach / std::sqrt(std::max(1e-9, solver.eigenvalues()[0])) / model_.radius();
-    if (best.leverage.isZero()) return;
+    if (best.leverage.isZero() || turn < kLeastTurn) return;
     const Twist step = std::min(turn, kFarthestTurn) * model_.radius() * scale.asDiagonal() *
                        solver.eigenvectors().col(0);
     std::array<RefinedPose, 2> tried;
