@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "leap_object_tracker/tracking/edge_profile.hpp"
+#include "limb_shift.hpp"
 #include "line_neighbours.hpp"
 
 namespace leap_object_tracker {
@@ -135,85 +136,6 @@ static float expectedStep(const ContourPoint& point, const Eigen::Vector3f& to_l
   return brightness(0) - brightness(1);
 }
 
-/// Where the limb of a matt round body shows that three lamps in a row light from beside the eye.
-class LimbShift {
- public:
-  LimbShift() {
-    tbb::parallel_for(0, kRadii, [&](int r) {
-      for (int l = 0; l < kLits; ++l)
-        for (int s = 0; s < kSpreads; ++s)
-          shifts_[index(r, l, s)] =
-              steepest(std::exp2(kFirstRadius + r), kFirstLit + l * kLitStep, s * kSpreadStep);
-    });
-  }
-
-  /// How far inside, in deviations of the blur.
-  /// @param radius in such deviations
-  /// @param lit cosine between the normal at the limb and the middle lamp
-  /// @param spread by which that of the other two is more and less
-  double at(double radius, double lit, double spread) const {
-    const auto place = [](double x, int count) { return std::clamp(x, 0.0, count - 1.001); };
-    const double r = place(std::log2(std::max(radius, 1e-3)) - kFirstRadius, kRadii);
-    const double l = place((lit - kFirstLit) / kLitStep, kLits);
-    const double s = place(std::abs(spread) / kSpreadStep, kSpreads);
-    double sum = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const int dr = corner & 1, dl = corner >> 1 & 1, ds = corner >> 2;
-      const auto share = [](double x, int d) {
-        const double rest = x - std::floor(x);
-        return d == 0 ? 1 - rest : rest;
-      };
-      sum += share(r, dr) * share(l, dl) * share(s, ds) *
-             shifts_[index(static_cast<int>(r) + dr, static_cast<int>(l) + dl,
-                           static_cast<int>(s) + ds)];
-    }
-    return sum;
-  }
-
- private:
-  static constexpr int kRadii = 9, kLits = 13, kSpreads = 5;
-  static constexpr double kFirstRadius = -2, kFirstLit = -0.6, kLitStep = 0.1, kSpreadStep = 0.15;
-
-  static std::size_t index(int r, int l, int s) {
-    return static_cast<std::size_t>((r * kLits + l) * kSpreads + s);
-  }
-
-  /// Steepest place of the blurred brightness: the sum over the lamps of max(0, n * l), n the
-  /// normal that turns from the limb to the eye (Lambert).
-  static double steepest(double radius, double lit, double spread) {
-    constexpr double kFirst = -2, kLast = 3, kStep = 0.1, kFar = 3.5;
-    constexpr int kParts = 64;
-    const auto slopeAt = [&](double place) {
-      // Distance from the limb, by its root.
-      const double end = std::sqrt(std::clamp(place + kFar, 0.0, 2 * radius));
-      double slope = 0;
-      for (int k = 0; k < kParts; ++k) {
-        const double root = end * (k + 0.5) / kParts, inside = root * root;
-        const double outwards = 1 - inside / radius;
-        const double towards = std::sqrt(std::max(0.0, 1 - outwards * outwards));
-        double brightness = 0;
-        for (const double lamp : {lit - spread, lit, lit + spread})
-          brightness +=
-              std::max(0.0, lamp * outwards + std::sqrt(std::max(0.0, 1 - lamp * lamp)) * towards);
-        const double apart = inside - place;
-        slope += brightness * apart * std::exp(-0.5 * apart * apart) * root;
-      }
-      return slope * end;
-    };
-    double best = 0, before = 0, after = 0, found = 0, last = slopeAt(kFirst - kStep);
-    double here = slopeAt(kFirst);
-    for (double place = kFirst; place < std::min(kLast, radius + 1); place += kStep) {
-      const double next = slopeAt(place + kStep);
-      if (here > best) best = here, before = last, after = next, found = place;
-      last = here, here = next;
-    }
-    const double bend = before - 2 * best + after;
-    return bend < 0 ? found + 0.5 * kStep * (before - after) / bend : found;
-  }
-
-  std::array<double, static_cast<std::size_t>(kRadii* kLits* kSpreads)> shifts_{};
-};
-
 /// One contour point that was looked for in one eye.
 struct PoseRefiner::Match {
   Twist jacobian;                 ///< of the offset along the normal, by the camera twist [px]
@@ -273,7 +195,7 @@ void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches)
 }
 
 PoseRefiner::PoseRefiner(const ContourParams& params, const RectifiedStereoCamera& camera)
-    : params_(params), camera_(camera) {}
+    : params_(params), camera_(camera), limb_shift_(&LimbShift::instance()) {}
 
 void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                         const Pose& pose, const std::array<ContourView, 2>* exact, double range,
@@ -346,13 +268,12 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       if (point.limb > 0 && match.outline) {
         const double blur = std::sqrt(std::pow(kBlurU * normal.x(), 2) +
                                       std::pow(kBlurV * normal.y(), 2) + kSearchBlur);
-        static const LimbShift limb_shift;
         const double lit = static_cast<double>(point.outward.dot(to_light));
         const double spread =
             kLampSpacing / at.norm() * (rotation * point.outward.cast<double>()).x();
         const double shift =
             params_.limb_darkening * blur *
-            limb_shift.at(scale * static_cast<double>(point.limb) / blur, lit, spread);
+            limb_shift_->at(scale * static_cast<double>(point.limb) / blur, lit, spread);
         match.place -= static_cast<float>(shift) * normal.cast<float>();
       }
       match.normal = normal.cast<float>();

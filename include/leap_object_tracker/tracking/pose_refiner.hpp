@@ -18,6 +18,8 @@ Pose movedInCamera(const Pose& camera_from_object, const Twist& camera_twist);
 /// The twist with movedInCamera(from, twist) == to.
 Twist cameraTwistBetween(const Pose& from, const Pose& to);
 
+class LimbShift;
+
 /// What is known of a pose before the image speaks: a Gaussian of the camera twist about `mean`.
 struct PosePrior {
   Pose mean = Pose::Identity();
@@ -93,6 +95,7 @@ class PoseRefiner {
 
   ContourParams params_;
   RectifiedStereoCamera camera_;
+  const LimbShift* limb_shift_;
 };
 
 /// Refines once more on the contour of exactly this view, where the model knows only one nearby.

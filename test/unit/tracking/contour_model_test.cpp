@@ -81,6 +81,26 @@ TEST(ContourOfABox, isTheRectangleOfTheOneFaceInSight) {
   }
 }
 
+/// Whether each crease has its first face on the side of tangent x normal.
+void expectOrderedFaces(const std::vector<ContourPoint>& points, float half) {
+  int creases = 0;
+  for (const ContourPoint& point : points) {
+    if (point.outline()) continue;
+    ++creases;
+    // The middle of the first face, as seen from the crease.
+    const Vector3f inside = half * point.faces[0] - point.position;
+    EXPECT_GT(inside.dot(point.tangent.cross(point.faces[0])), 0) << point.position.transpose();
+  }
+  EXPECT_GT(creases, 0);
+}
+
+TEST(ContourOfABox, namesTheFacesOfACreaseInTheirOrder) {
+  for (const Vector3d& eye : {Vector3d(0.2, 0.2, 0.2), Vector3d(-0.1, 0.2, -0.15)}) {
+    expectOrderedFaces(seenFrom(cube(), eye), 0.015F);
+    expectOrderedFaces(seenFrom(meshCube(), eye), 0.015F);
+  }
+}
+
 TEST(ContourOfABox, leavesOutTheEdgesThatItHides) {
   const ContourModel model(makePrimitive("box", Shape::kBox, {0.02, 0.04, 0.06}), kPoints);
   const auto points = seenFrom(model, {0.2, 0.2, 0.2});
@@ -126,7 +146,7 @@ TEST(ContourOfACylinder, hasTwoLimbsAndTheNearHalvesOfItsRims) {
   const double limb = std::acos(0.015 / 0.06);  // from the eye's direction to the tangent point
   const double step = 2 * M_PI / 180;
   EXPECT_NEAR(lengthOf(points), 2 * 0.065 + 4 * 0.015 * limb, 4 * 0.015 * step);
-  const auto is_limb = [](const ContourPoint& point) { return point.limb > 0.5F; };
+  const auto is_limb = [](const ContourPoint& point) { return point.limb > 0; };
   EXPECT_NEAR(lengthOf(points, is_limb), 2 * 0.065, 0.004);
   for (const ContourPoint& point : points) {
     if (!is_limb(point)) continue;
@@ -148,7 +168,7 @@ TEST(ContourOfACylinder, showsTheWholeRimOfTheEndInSight) {
   const ContourModel model(makePrimitive("cylinder", Shape::kCylinder, {0.015, 0.065, 0}), kPoints);
   const auto points = seenFrom(model, {0.06, 0, 0.1});
   const auto upper = [](const ContourPoint& point) {
-    return point.limb < 0.5F && point.position.z() > 0;
+    return !(point.limb > 0) && point.position.z() > 0;
   };
   EXPECT_NEAR(lengthOf(points, upper), 2 * M_PI * 0.015, 0.003);
 }
@@ -202,7 +222,7 @@ TEST(ContourOfAMesh, ofACylinderHasTheLimbsOfTheCylinder) {
   const ContourModel primitive(makePrimitive("cylinder", Shape::kCylinder, {0.015, 0.065, 0}),
                                kPoints);
   const ContourModel mesh(meshOnly(makeCylinder(0.015, 0.065, 60)), kPoints);
-  const auto limb = [](const ContourPoint& point) { return point.limb > 0.5F; };
+  const auto limb = [](const ContourPoint& point) { return point.limb > 0; };
   for (const Vector3d& eye : {Vector3d(0.1, 0.03, 0.02), Vector3d(-0.06, 0.1, 0.08)}) {
     const auto expected = seenFrom(primitive, eye), points = seenFrom(mesh, eye);
     EXPECT_NEAR(lengthOf(points), lengthOf(expected), 0.1 * lengthOf(expected));
@@ -213,6 +233,7 @@ TEST(ContourOfAMesh, ofACylinderHasTheLimbsOfTheCylinder) {
       const double off = point.position.cast<double>().dot(aside);
       EXPECT_GT(off * point.outward.cast<double>().dot(aside), 0) << "outward leaves the axis";
       EXPECT_NEAR(point.position.head<2>().norm(), 0.015, 1e-4);
+      EXPECT_NEAR(point.limb, 0.015, 0.0015) << "its radius of curvature";
       // Lengths of limbs are those across the ray.
       seen += point.length;
     }
@@ -354,6 +375,19 @@ TEST_F(ContourOfAMug, hidesTheHandleBehindTheCup) {
 TEST_F(ContourOfAMug, showsTheHandleBesideTheCup) {
   const auto points = seenFrom(model(), {0, -0.12, 0});
   EXPECT_GT(lengthOf(points, onHandle), 0.05) << "its outer and its inner arc";
+}
+
+TEST_F(ContourOfAMug, hasTheCupBehindTheOutlineOfAHandleInFront) {
+  const auto inner = [](const ContourPoint& point) { return point.inner > 0; };
+  const auto outer = [](const ContourPoint& point) { return point.outline() && point.inner == 0; };
+  const auto handle_before = [&](const ContourPoint& p) { return onHandle(p) && inner(p); };
+  const auto handle_beside = [&](const ContourPoint& p) { return onHandle(p) && outer(p); };
+  const auto front = seenFrom(model(), {0.15, 0, 0});
+  EXPECT_GT(lengthOf(front, handle_before), 0.05);
+  EXPECT_LT(lengthOf(front, handle_beside), 0.005);
+  const auto side = seenFrom(model(), {0, -0.15, 0});
+  EXPECT_GT(lengthOf(side, handle_beside), 0.03);
+  EXPECT_LT(lengthOf(side, handle_before), 0.01);
 }
 
 TEST_F(ContourOfAMug, showsTheInsideFromAboveOnly) {
