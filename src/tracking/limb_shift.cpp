@@ -13,7 +13,7 @@ constexpr double kFirstLit = -0.6, kLitStep = 0.1, kSpreadStep = 0.15;
 /// that turns from the limb to the eye (Lambert).
 double steepest(double radius, double lit, double spread) {
   constexpr double kFirst = -2, kLast = 5, kStep = 0.1, kFar = 3.5;
-  constexpr int kParts = 64;
+  constexpr int kParts = 96;
   // By the root of the distance from the limb, where the brightness bends most.
   std::array<double, kParts> insides{}, weights{};
   const double end = std::sqrt(std::min(kLast + kStep + kFar, 2 * radius));

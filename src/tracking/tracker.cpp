@@ -448,9 +448,9 @@ class Tracker::Impl {
     const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(leverage);
     const double turn =
         kDoubtReach / std::sqrt(std::max(1e-9, solver.eigenvalues()[0])) / model_.radius();
-    if (best.leverage.isZero() || turn < kLeastTurn) return;
-    const Twist step = std::min(turn, kFarthestTurn) * model_.radius() * scale.asDiagonal() *
-                       solver.eigenvectors().col(0);
+    // Farther than that, the image says nothing of it.
+    if (best.leverage.isZero() || turn < kLeastTurn || turn > kFarthestTurn) return;
+    const Twist step = turn * model_.radius() * scale.asDiagonal() * solver.eigenvectors().col(0);
     std::array<RefinedPose, 2> tried;
     tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
       const Pose other = movedInCamera(best.camera_from_object, i == 0 ? step : Twist(-step));
