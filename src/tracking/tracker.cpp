@@ -590,7 +590,15 @@ class Tracker::Impl {
         if (score(candidate) > score(best)) best = candidate;
     }
     tryLeastBound(doubted, score, best);
-    const bool use_features = features_.speak() && score(by_features) >= score(best);
+    // Where both lead to one place, features know more: the turn that the contour does not show.
+    const auto agree = [&](const Pose& a, const Pose& b) {
+      const double pixel = same / 2.5;
+      return (a.translation() - b.translation()).norm() < pixel &&
+             angleBetween(a.linear(), b.linear(), object_.symmetry) < pixel / model_.radius();
+    };
+    const bool use_features =
+        features_.speak() && (score(by_features) >= score(best) ||
+                              agree(by_features.camera_from_object, best.camera_from_object));
     if (use_features) best = by_features;
     const bool likely = expected(best.camera_from_object);
     if (!likely) belief_.widen(doubt(belief_.pose));
