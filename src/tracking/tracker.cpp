@@ -41,7 +41,7 @@ constexpr double kUnknownSpin = 0.25;     // [rad] of a free axis that nothing b
 constexpr double kDoubtShare = 0.3;       // of the particles, drawn as if the last pose were wrong
 constexpr double kDoubtReach = 4;         // [px] by which it then lies off
 constexpr double kLeastTurn = 0.15;       // [rad] of a least bound direction that is doubtful
-constexpr double kFarthestTurn = 0.4;     // [rad] of a pose that is least bound
+constexpr double kFarthestTurn = 0.4;     // [rad] of one that nothing binds
 constexpr double kClearlyBetter = 8;      // [nats] by which such a pose must be better
 constexpr double kDoubtCost = 5;          // [nats] against a pose that says so
 constexpr double kLeastSupport = 0.40;    // share of the contour to stand by a pose
@@ -132,7 +132,7 @@ class Tracker::Impl {
     begin(beliefAt(camera_from_object, params_.start.position_sigma,
                    params_.start.rotation_sigma_deg * M_PI / 180),
           false);
-    beginLooks(0.5);
+    beginLooks(Appearance{}.bright_inside);
     report_.state = TrackerState::kTracking;
     confirming_ = false;
     last_seen_.reset();
