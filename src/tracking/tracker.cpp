@@ -396,6 +396,13 @@ class Tracker::Impl {
     return covariance;
   }
 
+  /// Square of the unit twist about the free axis.
+  Matrix6d freeSpin(const Pose& pose) const {
+    Twist spin = Twist::Zero();
+    spin.tail<3>() = pose.linear() * object_.symmetry.free_axis;
+    return spin * spin.transpose();
+  }
+
   /// Covariance of what frames do not average out: errors of calibration [px] and of the object's
   /// own measures and edges [m].
   Matrix6d common(const Pose& pose) const {
@@ -408,11 +415,8 @@ class Tracker::Impl {
       most << Eigen::Vector3d::Constant(0.2 * depth), Eigen::Vector3d::Constant(0.3);
       Matrix6d information = leverage_ * (kCommonLines / (pixels * pixels));
       information.diagonal() += most.cwiseAbs2().cwiseInverse();
-      if (object_.symmetry.hasFreeAxis()) {  // the contour does not show it
-        Twist spin = Twist::Zero();
-        spin.tail<3>() = pose.linear() * object_.symmetry.free_axis;
-        information += std::pow(model_.radius() / error, 2) * spin * spin.transpose();
-      }
+      if (object_.symmetry.hasFreeAxis())  // the contour does not show it
+        information += std::pow(model_.radius() / error, 2) * freeSpin(pose);
       return information.inverse();
     }
     const double along = error * std::clamp(0.5 * depth / model_.radius(), 1.0, 5.0);
@@ -440,11 +444,8 @@ class Tracker::Impl {
     Twist scale;  // rotations as what they move
     scale << Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(1 / model_.radius());
     Matrix6d leverage = scale.asDiagonal() * best.leverage * scale.asDiagonal();
-    if (object_.symmetry.hasFreeAxis()) {
-      Twist spin = Twist::Zero();
-      spin.tail<3>() = best.camera_from_object.linear() * object_.symmetry.free_axis;
-      leverage += leverage.trace() * spin * spin.transpose();
-    }
+    if (object_.symmetry.hasFreeAxis())
+      leverage += leverage.trace() * freeSpin(best.camera_from_object);
     const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(leverage);
     const double turn =
         kDoubtReach / std::sqrt(std::max(1e-9, solver.eigenvalues()[0])) / model_.radius();
@@ -457,9 +458,8 @@ class Tracker::Impl {
       tried[i] =
           refiner_.refine(model_, measurement_.fields(), other, prior, appearance_, {5, 3.5, 2.5});
     });
-    const double least = score(best) + kClearlyBetter;
-    for (const RefinedPose& candidate : tried)
-      if (score(candidate) > std::max(least, score(best))) best = candidate;
+    const RefinedPose& better = score(tried[1]) > score(tried[0]) ? tried[1] : tried[0];
+    if (score(better) > score(best) + kClearlyBetter) best = better;
   }
 
   void scoreParticles() {
