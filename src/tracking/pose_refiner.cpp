@@ -40,6 +40,10 @@ constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rect
 constexpr double kSearchBlur = 1.9;
 constexpr double kLampSpacing = 0.035;  // [m] along the baseline, the middle one between the eyes
 constexpr float kIgnoredCosine = 0.6F;
+// Share of the contour that an eye finds: so little in one eye and so much in the other mean that
+// something hides the object from the first.
+constexpr double kHiddenShare = 0.4, kSeenShare = 0.7;
+constexpr double kHiddenCost = 0.5;  // [nats] against each independent sample of a hidden eye
 // [px] by how much the rounding and the gloss of an edge between two visible faces may move its
 // image.
 constexpr double kCreaseDoubt = 1.2;
@@ -383,6 +387,25 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
   }
 }
 
+/// Edges in an eye from which something hides the object are of something else: they do not move
+/// the pose.
+std::optional<int> PoseRefiner::ignoreHiddenEye(std::vector<Match>& matches) {
+  std::array<double, 2> found{}, all{};
+  for (const Match& m : matches) {
+    const auto eye = static_cast<std::size_t>(m.eye);
+    all[eye] += m.expected * m.samples;
+    if (m.found) found[eye] += m.expected * m.samples;
+  }
+  for (std::size_t eye = 0; eye < 2; ++eye) {
+    if (found[eye] >= kHiddenShare * all[eye] || found[1 - eye] <= kSeenShare * all[1 - eye])
+      continue;
+    for (Match& m : matches)
+      if (m.eye == static_cast<int>(eye)) m.found = false;
+    return static_cast<int>(eye);
+  }
+  return std::nullopt;
+}
+
 /// Replaces the place of the steepest slope by that of a fitted step.
 template <class Image>
 void PoseRefiner::fit(const Image& image, Match& match) const {
@@ -433,6 +456,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   for (const double range : ranges) {
     match(model, fields, pose, exact, range, appearance, range < kFine, kCrowdedRange, matches,
           result.eyes);
+    ignoreHiddenEye(matches);
     if (!ignored.isZero())
       for (Match& m : matches) {
         const float alike = m.normal.dot(ignored);
@@ -466,10 +490,15 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   const double last_range = 2.5;
   match(model, fields, pose, exact, last_range, appearance, true, kCrowdedReach, matches,
         result.eyes);
+  const std::optional<int> hidden = ignoreHiddenEye(matches);
   const double deviation = robustScale(last_range);
   result.residual = deviation;
   double bright = 0, judged = 0, found = 0;
   for (const Match& m : matches) {
+    if (hidden == m.eye) {
+      result.log_likelihood -= m.expected * m.samples * kHiddenCost;
+      continue;
+    }
     const double missed = m.expected * (m.outline ? kMissedOutline : kMissedCrease);
     double gain = -missed;
     if (m.found) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "leap_object_tracker/geometry/pose.hpp"
@@ -86,6 +87,7 @@ class PoseRefiner {
  private:
   struct Match;
   static void findClearances(std::size_t first, std::vector<Match>& matches);
+  static std::optional<int> ignoreHiddenEye(std::vector<Match>& matches);
   void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
              const std::array<ContourView, 2>* exact, double range, const Appearance& appearance,
              bool fine, double crowded_range, std::vector<Match>& matches,
