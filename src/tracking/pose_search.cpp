@@ -154,6 +154,7 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       camera_(camera),
       model_(&model),
       refiner_(params.contour, camera),
+      shaded_view_(object.mesh, camera),
       shadow_(shadowAreaOf(object.mesh)),
       pivots_(pivotsOf(object.mesh)),
       symmetry_(object.symmetry),
@@ -527,6 +528,8 @@ RefinedPose PoseSearch::bestTurned(const RefinedPose& pose) const {
   tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) {
     refineExactly(refiner_, *model_, fields_, camera_.baseline, {}, looks[order[i]],
                   refined[order[i]]);
+    refined[order[i]].log_likelihood +=
+        shaded_view_.logLikelihood(fields_, refined[order[i]].camera_from_object);
   });
   return refined[*std::min_element(order.begin(), order.end(), likelier)];
 }
@@ -537,6 +540,7 @@ RefinedPose PoseSearch::judge(const Pose& camera_from_object) const {
   RefinedPose refined =
       refiner_.refine(*model_, fields_, camera_from_object, {}, looks, {4, 3, 2.5});
   refineExactly(refiner_, *model_, fields_, camera_.baseline, {}, looks, refined);
+  refined.log_likelihood += shaded_view_.logLikelihood(fields_, refined.camera_from_object);
   return refined;
 }
 

@@ -17,6 +17,7 @@
 #include "leap_object_tracker/tracking/pose_belief.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/pose_search.hpp"
+#include "leap_object_tracker/tracking/turned_rivals.hpp"
 
 namespace leap_object_tracker {
 namespace {
@@ -49,11 +50,6 @@ constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies e
 constexpr double kLearningSupport = 0.7;     // of a pose at which the object's looks are learned
 constexpr int kYoungFrames = 80;  // after a start, in which turned poses are looked at often
 constexpr int kYoungPeriod = 2, kOldPeriod = 12;  // [frames]
-constexpr std::size_t kTurnedRefined = 6;         // turned poses a look
-constexpr double kTurnedMargin = 15;              // [nats] by which a turned pose must be better
-constexpr double kTurnedShare = 0.15;             // and this share of what it has
-constexpr int kTurnedVotes = 3;                   // looks in a row
-constexpr double kApart = 0.25;                   // [rad]
 constexpr double kTrustedLandmarks = 0.5;  // share of landmarks that make turned poses needless
 constexpr double kExact = 0.5;             // [px]
 constexpr int kPatience = 3;               // frames below it before the object counts as lost
@@ -113,6 +109,7 @@ class Tracker::Impl {
         refiner_(params.contour, camera),
         features_(params, object_, camera),
         search_(params, object_, model_, camera),
+        rivals_(object_, model_, refiner_, camera),
         arena_(std::max(1, params.threads)) {
     check(camera.focal_length > 0 && camera.baseline > 0 && camera.size.area() > 0,
           "tracker: the camera needs a focal length, a baseline and a size");
@@ -323,7 +320,8 @@ class Tracker::Impl {
 
   /// Nothing is known yet of how the object looks.
   void beginLooks(double bright_inside) {
-    tracked_frames_ = turned_votes_ = 0;
+    tracked_frames_ = 0;
+    rivals_.forget();
     appearance_ = {};
     appearance_.bright_inside = bright_inside;
   }
@@ -629,44 +627,18 @@ class Tracker::Impl {
     return refined;
   }
 
-  /// Bodies that look nearly the same turned over or round: now and then the best turned pose is
-  /// held against the one that is tracked, and takes its place if it is better several times.
+  /// Now and then the tracked pose is held against its turned ones.
   void considerTurned() {
     if (!object_.symmetry.trivial()) return;  // its likenesses are known
     ++tracked_frames_;
     const int period = tracked_frames_ < kYoungFrames ? kYoungPeriod : kOldPeriod;
     if (tracked_frames_ % period != 0 || features_.support(belief_.pose) > kTrustedLandmarks)
       return;
-    const std::vector<Pose> turned = search_.turned(belief_.pose);
-    if (turned.empty()) return;
-    std::vector<ParticlePose> poses;
-    for (const Pose& pose : turned) poses.push_back(toParticlePose(pose));
-    std::vector<float> scores(poses.size());
-    measurement_.score(model_, ContourMeasurement::Sharpness::kBlunt, poses.data(), poses.size(),
-                       scores.data());
-    const std::size_t count = std::min(kTurnedRefined, scores.size());
-    std::vector<std::uint32_t> order;
-    putBestFirst(scores, count, order);
-    std::vector<RefinedPose> refined(count + 1);
-    tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t i) {
-      refined[i] = refiner_.refine(model_, measurement_.fields(),
-                                   i < count ? turned[order[i]] : belief_.pose, {}, appearance_,
-                                   {8, 5, 3, 2.5});
-    });
-    const RefinedPose& own = refined.back();
-    const RefinedPose* best = &refined.front();
-    for (std::size_t i = 1; i < count; ++i)
-      if (refined[i].log_likelihood > best->log_likelihood) best = &refined[i];
-    const bool apart = angleBetween(best->camera_from_object.linear(), belief_.pose.linear(),
-                                    object_.symmetry) > kApart;
-    const double margin = kTurnedMargin + kTurnedShare * std::abs(own.log_likelihood);
-    const bool better = apart && best->log_likelihood > own.log_likelihood + margin &&
-                        best->evidence > own.evidence && best->support() > kFoundSupport;
-    turned_votes_ = better ? turned_votes_ + 1 : 0;
-    if (turned_votes_ < kTurnedVotes) return;
-    turned_votes_ = 0;
+    const auto better =
+        rivals_.look(belief_.pose, search_.turned(belief_.pose), measurement_, appearance_);
+    if (!better) return;
     const PoseBelief old = belief_;
-    belief_ = beliefAt(best->camera_from_object, kFoundPositionSigma, kFoundRotationSigma);
+    belief_ = beliefAt(*better, kFoundPositionSigma, kFoundRotationSigma);
     belief_.velocity = old.velocity;
     initializeFilter();
     last_seen_ = remembered_ = belief_.pose;
@@ -714,11 +686,11 @@ class Tracker::Impl {
   PoseRefiner refiner_;
   FeatureTracking features_;
   PoseSearch search_;
+  TurnedRivals rivals_;
   tbb::task_arena arena_;
   std::array<Eigen::Vector3d, 8> corners_;
   PoseBelief belief_;
   int tracked_frames_ = 0;  ///< since the last start
-  int turned_votes_ = 0;    ///< looks in a row at which a turned pose was better
   std::optional<Stamp> last_stamp_;
   std::optional<Pose> last_fixed_from_camera_;
   Appearance appearance_;

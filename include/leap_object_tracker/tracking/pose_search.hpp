@@ -14,6 +14,7 @@
 #include "leap_object_tracker/tracking/contour_reach.hpp"
 #include "leap_object_tracker/tracking/edge_field.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
+#include "leap_object_tracker/tracking/shaded_view.hpp"
 #include "leap_object_tracker/tracking/tracker_params.hpp"
 
 namespace leap_object_tracker {
@@ -78,6 +79,7 @@ class PoseSearch {
   RectifiedStereoCamera camera_;
   const ContourModel* model_;
   PoseRefiner refiner_;
+  ShadedView shaded_view_;
   ShadowArea shadow_;                    ///< of the object from all sides
   std::vector<Eigen::Vector3d> pivots_;  ///< [m] of turned()
   Symmetry symmetry_;

@@ -1,0 +1,203 @@
+#include "leap_object_tracker/tracking/shaded_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace leap_object_tracker {
+namespace {
+
+constexpr double kLampSpacing = 0.035;          // [m] along the baseline
+constexpr float kNearest = 0.01F;               // [m] of a vertex
+constexpr float kSaturated = 250;               // grey level
+constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rectified image
+constexpr int kRim = 2;                         // [px] of a silhouette that is left out
+constexpr double kPixelsPerSample = 15;         // neighbours share their errors
+constexpr double kFewestPixels = 60;            // of one eye
+constexpr double kLeastResidual = 0.05;         // of the brightness: what Lambert's law leaves
+constexpr float kGrossResidual = 60;            // [grey levels] something else is seen there
+constexpr float kShadowSlack = 0.01F;           // of the depth, by which a surface may hide itself
+constexpr int kFits = 3;
+
+}  // namespace
+
+/// What is nearest in each pixel of a box, as seen from one place.
+struct ShadedView::Depths {
+  cv::Rect box;
+  cv::Mat nearness;  ///< CV_32FC1 1/z [1/m], zero where nothing is seen
+  cv::Mat triangle;  ///< CV_32SC1
+};
+
+ShadedView::ShadedView(const Mesh& mesh, const RectifiedStereoCamera& camera)
+    : camera_(camera), triangles_(mesh.triangles) {
+  vertices_.reserve(mesh.vertices.size());
+  for (const Eigen::Vector3d& vertex : mesh.vertices) vertices_.push_back(vertex.cast<float>());
+}
+
+double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
+                                 const Pose& camera_from_object) const {
+  const Eigen::Matrix3f rotation = camera_from_object.linear().cast<float>();
+  const Eigen::Vector3f origin = camera_from_object.translation().cast<float>();
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(vertices_.size());
+  for (const Eigen::Vector3f& vertex : vertices_) {
+    points.emplace_back(rotation * vertex + origin);
+    if (points.back().z() < kNearest) return 0;
+  }
+  std::array<float, 3> lamps{};
+  std::array<Depths, 3> lit;
+  const cv::Rect everywhere(-2000, -2000, 5000, 5000);
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    lamps[i] =
+        static_cast<float>(0.5 * camera_.baseline + (static_cast<double>(i) - 1) * kLampSpacing);
+    look(points, lamps[i], everywhere, lit[i]);
+  }
+  Sums all;
+  for (std::size_t eye = 0; eye < 2; ++eye) {
+    if (!fields[eye].seen()) continue;
+    const auto eye_x = static_cast<float>(eye == 0 ? 0 : camera_.baseline);
+    Depths seen;
+    look(points, eye_x, fields[eye].region(), seen);
+    const Sums sums = compare(fields[eye], points, eye_x, seen, lamps, lit);
+    all.residual += sums.residual;
+    all.brightness += sums.brightness;
+    all.pixels += sums.pixels;
+  }
+  if (all.pixels <= 0 || all.brightness <= 0) return 0;
+  return -0.5 * all.pixels / kPixelsPerSample *
+         std::log(all.residual / all.brightness + kLeastResidual * kLeastResidual);
+}
+
+/// Draws the triangles that look at a place on the baseline, as a camera there would see them.
+void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
+                      const cv::Rect& limits, Depths& seen) const {
+  thread_local std::vector<Eigen::Vector3f> image;  // u, v [px], 1/z [1/m]
+  image.clear();
+  const auto focal = static_cast<float>(camera_.focal_length);
+  Eigen::Array2f low = Eigen::Array2f::Constant(1e9F), high = -low;
+  for (const Eigen::Vector3f& point : points) {
+    const float near = 1 / point.z();
+    image.emplace_back(static_cast<float>(camera_.center_u) + focal * (point.x() - eye_x) * near,
+                       static_cast<float>(camera_.center_v) + focal * point.y() * near, near);
+    low = low.min(image.back().head<2>().array());
+    high = high.max(image.back().head<2>().array());
+  }
+  const auto bounded = [](float value) { return static_cast<int>(std::clamp(value, -1e4F, 1e4F)); };
+  seen.box = cv::Rect(cv::Point(bounded(low.x()) - 2, bounded(low.y()) - 2),
+                      cv::Point(bounded(high.x()) + 3, bounded(high.y()) + 3)) &
+             limits;
+  seen.nearness = cv::Mat(seen.box.size(), CV_32FC1, cv::Scalar(0));
+  seen.triangle = cv::Mat(seen.box.size(), CV_32SC1);
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    const Eigen::Vector3f &a = image[triangles_[t][0]], &b = image[triangles_[t][1]],
+                          &c = image[triangles_[t][2]];
+    const Eigen::Vector2f ab = (b - a).head<2>(), ac = (c - a).head<2>();
+    const float area = ab.x() * ac.y() - ab.y() * ac.x();
+    if (area >= -1e-6F) continue;  // counter-clockwise from outside: seen from behind
+    const auto [least_u, most_u] = std::minmax({a.x(), b.x(), c.x()});
+    const auto [least_v, most_v] = std::minmax({a.y(), b.y(), c.y()});
+    const int first_u = std::max(seen.box.x, bounded(std::ceil(least_u)));
+    const int last_u = std::min(seen.box.x + seen.box.width - 1, bounded(std::floor(most_u)));
+    const int first_v = std::max(seen.box.y, bounded(std::ceil(least_v)));
+    const int last_v = std::min(seen.box.y + seen.box.height - 1, bounded(std::floor(most_v)));
+    for (int v = first_v; v <= last_v; ++v) {
+      auto* nearness = seen.nearness.ptr<float>(v - seen.box.y);
+      auto* triangle = seen.triangle.ptr<int>(v - seen.box.y);
+      for (int u = first_u; u <= last_u; ++u) {
+        const float du = static_cast<float>(u) - a.x(), dv = static_cast<float>(v) - a.y();
+        const float second = (du * ac.y() - dv * ac.x()) / area;
+        const float third = (ab.x() * dv - ab.y() * du) / area;
+        constexpr float kSlack = -1e-3F;
+        if (second < kSlack || third < kSlack || 1 - second - third < kSlack) continue;
+        const float near = a.z() + second * (b.z() - a.z()) + third * (c.z() - a.z());
+        if (near <= nearness[u - seen.box.x]) continue;
+        nearness[u - seen.box.x] = near;
+        triangle[u - seen.box.x] = static_cast<int>(t);
+      }
+    }
+  }
+}
+
+ShadedView::Sums ShadedView::compare(const EdgeField& field,
+                                     const std::vector<Eigen::Vector3f>& points, float eye_x,
+                                     const Depths& seen, const std::array<float, 3>& lamps,
+                                     const std::array<Depths, 3>& lit) const {
+  if (seen.box.area() < kFewestPixels) return {};
+  cv::Mat inside;
+  cv::erode(seen.nearness > 0, inside,
+            cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kRim + 1, 2 * kRim + 1)),
+            cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
+  const cv::Mat grey = field.image()(seen.box - field.region().tl());
+  const auto focal = static_cast<float>(camera_.focal_length);
+  const auto center_u = static_cast<float>(camera_.center_u);
+  const auto center_v = static_cast<float>(camera_.center_v);
+
+  cv::Mat shading(seen.box.size(), CV_32FC1, cv::Scalar(0));
+  for (int v = 0; v < seen.box.height; ++v)
+    for (int u = 0; u < seen.box.width; ++u) {
+      const float near = seen.nearness.at<float>(v, u);
+      if (near <= 0) continue;
+      const float depth = 1 / near;
+      const Eigen::Vector3f at(
+          eye_x + (static_cast<float>(u + seen.box.x) - center_u) * depth / focal,
+          (static_cast<float>(v + seen.box.y) - center_v) * depth / focal, depth);
+      const auto& corners = triangles_[static_cast<std::size_t>(seen.triangle.at<int>(v, u))];
+      const Eigen::Vector3f& corner = points[corners[0]];
+      const Eigen::Vector3f normal =
+          (points[corners[1]] - corner).cross(points[corners[2]] - corner).normalized();
+      float shade = 0;
+      for (std::size_t i = 0; i < lamps.size(); ++i) {
+        const Eigen::Vector3f to_lamp = Eigen::Vector3f(lamps[i], 0, 0) - at;
+        const float cosine = normal.dot(to_lamp);
+        if (cosine <= 0) continue;
+        // Something else of the body may throw its shadow here.
+        const cv::Point cell(cvRound(center_u + focal * (at.x() - lamps[i]) / depth) - lit[i].box.x,
+                             v + seen.box.y - lit[i].box.y);
+        if (cell.x >= 0 && cell.y >= 0 && cell.x < lit[i].box.width && cell.y < lit[i].box.height &&
+            lit[i].nearness.at<float>(cell) * depth > 1 + kShadowSlack)
+          continue;
+        const float square = to_lamp.squaredNorm();
+        shade += cosine / (square * std::sqrt(square));
+      }
+      shading.at<float>(v, u) = shade;
+    }
+  cv::GaussianBlur(shading, shading, cv::Size(7, 7), kBlurU, kBlurV, cv::BORDER_REPLICATE);
+
+  thread_local std::vector<std::array<float, 2>> pixels;  // grey value, shading
+  pixels.clear();
+  for (int v = 0; v < seen.box.height; ++v)
+    for (int u = 0; u < seen.box.width; ++u)
+      if (inside.at<std::uint8_t>(v, u) != 0)
+        pixels.push_back(
+            {static_cast<float>(grey.at<std::uint8_t>(v, u)), shading.at<float>(v, u)});
+  if (static_cast<double>(pixels.size()) < kFewestPixels) return {};
+
+  double scale = 0;
+  for (int fit = 0; fit < kFits; ++fit) {
+    double upper = 0, lower = 0;
+    for (const auto& [value, shade] : pixels) {
+      const auto expected = static_cast<float>(scale) * shade;
+      if (value > kSaturated && (fit == 0 || expected > kSaturated)) continue;
+      if (fit > 0 && std::abs(value - expected) > kGrossResidual) continue;
+      upper += static_cast<double>(value * shade);
+      lower += static_cast<double>(shade * shade);
+    }
+    if (lower <= 0) break;
+    scale = upper / lower;
+  }
+  if (scale <= 0) return {};
+  Sums sums;
+  for (const auto& [value, shade] : pixels) {
+    const float expected = std::min(255.0F, static_cast<float>(scale) * shade);
+    const float residual = value > kSaturated && expected > kSaturated
+                               ? 0
+                               : std::clamp(value - expected, -kGrossResidual, kGrossResidual);
+    sums.residual += static_cast<double>(residual * residual);
+    if (value > kSaturated) continue;
+    sums.brightness += static_cast<double>(value * value);
+    sums.pixels += 1;
+  }
+  return sums;
+}
+
+}  // namespace leap_object_tracker
