@@ -27,6 +27,10 @@ constexpr double kOutlineSpread = 0.5, kCreaseSpread = 0.8;  // [px]
 // Against chance [nats]: an edge near an arbitrary place is seen about every third time, an outline
 // nearly always, a crease often not.
 constexpr double kMissedOutline = 1.5, kMissedCrease = 0.7;
+// Of that, where the object is dark beside the outline, so that none may show, and where it is
+// bright; as shares of the brightness beside the outline that is found.
+constexpr double kMissedDark = 0.6, kMissedBright = 2;
+constexpr double kDarkShare = 0.2, kBrightShare = 0.6;
 // [px] that are searched however close the next line is: to move a pose, and to judge it, for which
 // it does not matter which of the two an edge belongs to.
 constexpr double kCrowdedRange = 0.75, kCrowdedReach = 1.6;
@@ -160,6 +164,7 @@ struct PoseRefiner::Match {
   bool outline = false;
   bool limb = false;
   bool bright_inside = false;
+  float inner = -1;     ///< [grey levels] beside an outline, on its inner side; negative: unknown
   double crowding = 0;  ///< [px] by which lines that blur together may move an edge
   double noise = 0;     ///< [grey levels] that the fitted step left; zero: none was fitted
   /// Contrast that is to be expected, 1 enough to be seen, 0 none: for what is not seen to count.
@@ -295,7 +300,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
 
       // Grey values along the normal; the part inside the region only.
       const bool region = match.outline && appearance.grey.known();
-      const int span = reach + (region ? kRegionReach : 2);
+      const int span = std::max(4, reach + (region ? kRegionReach : 2));
       int low = -span, high = span;
       const auto inside = [&](int k) {
         return sample.contains(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
@@ -329,6 +334,11 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           return 0.5F * (mean(k - kRegionReach, k - 1) - mean(k + 2, k + 1 + kRegionReach));
         };
         if (region) match.region = regionAt(0);
+        if (match.outline && low <= -4)
+          match.inner = (profile[static_cast<std::size_t>(span - 2)] +
+                         profile[static_cast<std::size_t>(span - 3)] +
+                         profile[static_cast<std::size_t>(span - 4)]) /
+                        3;
         float best = 0;
         // Lines closer than the blur of the image pull each other's edges.
         match.crowding = std::max(0.0, 0.25 * (4.0 - clearance));
@@ -385,6 +395,24 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         support.supported += match.expected * match.length;
     }
   }
+}
+
+/// [grey levels] beside the outline that each eye found, on its inner side: the median; zero if
+/// little was found.
+std::array<double, 2> PoseRefiner::brightnessInside(const std::vector<Match>& matches) {
+  constexpr std::size_t kFewest = 6;
+  std::array<double, 2> brightness{};
+  thread_local std::vector<float> inner;
+  for (std::size_t eye = 0; eye < 2; ++eye) {
+    inner.clear();
+    for (const Match& m : matches)
+      if (m.found && m.inner >= 0 && m.eye == static_cast<int>(eye)) inner.push_back(m.inner);
+    if (inner.size() < kFewest) continue;
+    const auto middle = inner.begin() + static_cast<std::ptrdiff_t>(inner.size() / 2);
+    std::nth_element(inner.begin(), middle, inner.end());
+    brightness[eye] = static_cast<double>(*middle);
+  }
+  return brightness;
 }
 
 /// Edges in an eye from which something hides the object are of something else: they do not move
@@ -494,12 +522,19 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   const double deviation = robustScale(last_range);
   result.residual = deviation;
   double bright = 0, judged = 0, found = 0;
+  const std::array<double, 2> typical = brightnessInside(matches);
   for (const Match& m : matches) {
     if (hidden == m.eye) {
       result.log_likelihood -= m.expected * m.samples * kHiddenCost;
       continue;
     }
-    const double missed = m.expected * (m.outline ? kMissedOutline : kMissedCrease);
+    double missed = m.expected * (m.outline ? kMissedOutline : kMissedCrease);
+    if (m.outline && !m.found && m.inner >= 0 && typical[static_cast<std::size_t>(m.eye)] > 0) {
+      const double share = static_cast<double>(m.inner) / typical[static_cast<std::size_t>(m.eye)];
+      missed *= kMissedDark +
+                (kMissedBright - kMissedDark) *
+                    std::clamp((share - kDarkShare) / (kBrightShare - kDarkShare), 0.0, 1.0);
+    }
     double gain = -missed;
     if (m.found) {
       const double weight = tukeyWeight(m.offset, 4.685 * std::max(deviation, params_.edge_sigma));

@@ -57,8 +57,9 @@ constexpr double kFoundSupport = 0.68;     // share of the contour that a found 
 constexpr double kSureStart = 0.85;        // support that needs no other frame to prove itself
 constexpr double kRefoundSupport = 0.6;    // the same, close to where the object was last
 constexpr double kRefoundReach = 0.03;     // [m]
-constexpr double kFoundInside = 0.3;       // share of the contour inside the images
-constexpr double kSureSupport = 0.7;       // below it the search is asked for its opinion
+constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
+constexpr double kFoundInside = 0.3;                 // share of the contour inside the images
+constexpr double kSureSupport = 0.7;                 // below it the search is asked for its opinion
 constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
 constexpr double kOpinionMargin = 20;                // [nats] by which another pose must be better
 constexpr double kOpinionSupport = 0.15;             // and have more support
@@ -255,6 +256,7 @@ class Tracker::Impl {
         last_seen_ &&
         (found.camera_from_object.translation() - last_seen_->translation()).norm() < kRefoundReach;
     return found.support() >= (near ? kRefoundSupport : kFoundSupport) &&
+           found.strength() >= (near ? kRefoundStrength : kFoundStrength) &&
            found.insideShare() >= kFoundInside;
   }
 

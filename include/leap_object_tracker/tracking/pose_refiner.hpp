@@ -57,6 +57,12 @@ struct RefinedPose {
     return whole > 0 ? (eyes[0].inside + eyes[1].inside) / whole : 0;
   }
 
+  /// Evidence for each pixel of contour that should be seen [nats/px].
+  double strength() const {
+    const double visible = eyes[0].visible + eyes[1].visible;
+    return visible > 0 ? evidence / visible : 0;
+  }
+
   double support() const {
     const double visible = eyes[0].visible + eyes[1].visible;
     return visible > 0 ? (eyes[0].supported + eyes[1].supported) / visible : 0;
@@ -87,6 +93,7 @@ class PoseRefiner {
  private:
   struct Match;
   static void findClearances(std::size_t first, std::vector<Match>& matches);
+  static std::array<double, 2> brightnessInside(const std::vector<Match>& matches);
   static std::optional<int> ignoreHiddenEye(std::vector<Match>& matches);
   void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
              const std::array<ContourView, 2>* exact, double range, const Appearance& appearance,
