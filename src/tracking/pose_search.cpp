@@ -534,6 +534,10 @@ RefinedPose PoseSearch::bestTurned(const RefinedPose& pose) const {
   return refined[*std::min_element(order.begin(), order.end(), likelier)];
 }
 
+void PoseSearch::learn(const Pose& camera_from_object, Appearance& appearance) const {
+  refiner_.learn(*model_, fields_, camera_from_object, appearance);
+}
+
 RefinedPose PoseSearch::judge(const Pose& camera_from_object) const {
   Appearance looks;
   refiner_.learn(*model_, fields_, camera_from_object, looks);

@@ -58,6 +58,7 @@ constexpr double kSureStart = 0.85;        // support that needs no other frame 
 constexpr double kRefoundSupport = 0.6;    // the same, close to where the object was last
 constexpr double kRefoundReach = 0.03;     // [m]
 constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
+constexpr double kProvenStrength = 0.3, kLeastStrength = 0.13;   // [nats/px] once, and until then
 constexpr double kFoundInside = 0.3;                 // share of the contour inside the images
 constexpr double kSureSupport = 0.7;                 // below it the search is asked for its opinion
 constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
@@ -248,6 +249,7 @@ class Tracker::Impl {
     }
     takeUp(known.value_or(asLastSeen(found->camera_from_object)), frame.stamp, known.has_value());
     beginLooks(std::clamp(found->bright_inside, 0.3, 0.9));
+    search_.learn(belief_.pose, appearance_);
   }
 
   /// Whether a pose that was searched for may be the object's.
@@ -318,6 +320,7 @@ class Tracker::Impl {
     weak_frames_ = 0;
     leverage_.setZero();
     fresh_ = true;
+    proven_ = sure;
   }
 
   /// Nothing is known yet of how the object looks.
@@ -649,14 +652,20 @@ class Tracker::Impl {
   void takeOver(const RefinedPose& refined) {
     const double landmark_support = features_.support(refined.camera_from_object);
     report_.support = features_.alone() ? landmark_support : refined.support();
+    // What was never seen clearly since the start may be something else.
+    const double strength = features_.alone() ? kProvenStrength : refined.strength();
+    proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
     const bool supported =
+        (proven_ || strength >= kLeastStrength) &&
         !features_.contradict(refined.camera_from_object, report_.support) &&
         (report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
          (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_));
     if (confirming_) {
       confirming_ = false;
       frames_lost_ = 0;
-      if (report_.support < kFoundSupport && landmark_support < kLandmarkSupport) return;
+      if ((report_.support < kFoundSupport || strength < kLeastStrength) &&
+          landmark_support < kLandmarkSupport)
+        return;
     }
     if (supported) {
       leverage_ = refined.leverage;
@@ -703,6 +712,7 @@ class Tracker::Impl {
   int frames_to_opinion_ = kFirstOpinion, opinion_period_ = kFirstOpinion;
   int frames_lost_ = 0;
   bool fresh_ = false;
+  bool proven_ = false;             ///< seen clearly since the start
   bool confirming_ = false;         ///< the last search found something
   std::optional<Pose> last_seen_;   ///< where the object was when the tracker stood by it
   std::optional<Pose> remembered_;  ///< the same, for as long as it takes

@@ -43,6 +43,9 @@ class PoseSearch {
   /// A pose refined and judged on the last frame as those that find() compares.
   RefinedPose judge(const Pose& camera_from_object) const;
 
+  /// Takes the looks of the object at a pose in the last frame into `appearance`.
+  void learn(const Pose& camera_from_object, Appearance& appearance) const;
+
   /// Poses at the same place in which the object looks nearly as at this one: turned over, or round
   /// its axes.
   std::vector<Pose> turned(const Pose& camera_from_object) const;
