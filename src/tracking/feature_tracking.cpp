@@ -181,13 +181,15 @@ void FeatureTracking::conclude(const PoseBelief& belief, bool trusted, double co
 }
 
 /// When to look for features next: at once while they carry the pose and have something to add, now
-/// and then while the contour says all, ever more rarely while they do not carry it.
+/// and then while they are few and the contour says all, ever more rarely while they do not carry
+/// it.
 void FeatureTracking::keepWatch(const FeatureSupport& support, double contour_support) {
   wait_ = 0;
   if (support.landmark_points >= kWorthWhile) {
     trial_ = kTrial;
     period_ = kFirstPeriod;
-    if (contour_support > kClearContour && !symmetry_.hasFreeAxis()) wait_ = kReminder;
+    const bool enough = support.landmark_points < kNoDoubt && contour_support > kClearContour;
+    if (enough && !symmetry_.hasFreeAxis()) wait_ = kReminder;
   } else if (--trial_ <= 0) {
     wait_ = period_;
     period_ = std::min(2 * period_, kLongestPeriod);

@@ -58,7 +58,7 @@ constexpr double kSureStart = 0.85;        // support that needs no other frame 
 constexpr double kRefoundSupport = 0.6;    // the same, close to where the object was last
 constexpr double kRefoundReach = 0.03;     // [m]
 constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
-constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;   // [nats/px] once, and until then
+constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;    // [nats/px] once, and until then
 constexpr double kFoundInside = 0.3;                 // share of the contour inside the images
 constexpr double kSureSupport = 0.7;                 // below it the search is asked for its opinion
 constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
@@ -657,7 +657,7 @@ class Tracker::Impl {
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
     const bool supported =
         (proven_ || strength >= kLeastStrength) &&
-        !features_.contradict(refined.camera_from_object, report_.support) &&
+        !features_.contradict(refined.camera_from_object, refined.bestEyeSupport()) &&
         (report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
          (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_));
     if (confirming_) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <vector>
@@ -33,6 +34,8 @@ struct EyeSupport {
   double supported = 0;  ///< [px] of it, with an edge of the right direction at the right place
   double whole = 0;      ///< [px] length of the contour, inside the image or not
   double inside = 0;     ///< [px] of it inside the image
+
+  double share() const { return visible > 0 ? supported / visible : 0; }
 };
 
 struct RefinedPose {
@@ -62,6 +65,9 @@ struct RefinedPose {
     const double visible = eyes[0].visible + eyes[1].visible;
     return visible > 0 ? evidence / visible : 0;
   }
+
+  /// Share of the contour that the eye supports which sees it best.
+  double bestEyeSupport() const { return std::max(eyes[0].share(), eyes[1].share()); }
 
   double support() const {
     const double visible = eyes[0].visible + eyes[1].visible;
