@@ -16,7 +16,8 @@ constexpr double kPixelsPerSample = 15;         // neighbours share their errors
 constexpr double kFewestPixels = 60;            // of one eye
 constexpr double kLeastResidual = 0.05;         // of the brightness: what Lambert's law leaves
 constexpr float kGrossResidual = 60;            // [grey levels] something else is seen there
-constexpr float kShadowSlack = 0.01F;           // of the depth, by which a surface may hide itself
+constexpr float kLampScale = 0.5F;              // of the image, for what a lamp sees
+constexpr float kShadowSlack = 0.02F;           // of the depth, by which a surface may hide itself
 constexpr int kFits = 3;
 
 }  // namespace
@@ -44,21 +45,25 @@ double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
     points.emplace_back(rotation * vertex + origin);
     if (points.back().z() < kNearest) return 0;
   }
+  std::vector<Eigen::Vector3f> normals;
+  normals.reserve(triangles_.size());
+  for (const auto& [a, b, c] : triangles_)
+    normals.emplace_back((points[b] - points[a]).cross(points[c] - points[a]).normalized());
   std::array<float, 3> lamps{};
   std::array<Depths, 3> lit;
   const cv::Rect everywhere(-2000, -2000, 5000, 5000);
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     lamps[i] =
         static_cast<float>(0.5 * camera_.baseline + (static_cast<double>(i) - 1) * kLampSpacing);
-    look(points, lamps[i], everywhere, lit[i]);
+    look(points, lamps[i], everywhere, kLampScale, lit[i]);
   }
   Sums all;
   for (std::size_t eye = 0; eye < 2; ++eye) {
     if (!fields[eye].seen()) continue;
     const auto eye_x = static_cast<float>(eye == 0 ? 0 : camera_.baseline);
     Depths seen;
-    look(points, eye_x, fields[eye].region(), seen);
-    const Sums sums = compare(fields[eye], points, eye_x, seen, lamps, lit);
+    look(points, eye_x, fields[eye].region(), 1, seen);
+    const Sums sums = compare(fields[eye], normals, eye_x, seen, lamps, lit);
     all.residual += sums.residual;
     all.brightness += sums.brightness;
     all.pixels += sums.pixels;
@@ -69,16 +74,18 @@ double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
 }
 
 /// Draws the triangles that look at a place on the baseline, as a camera there would see them.
+/// @param scale of the image
 void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
-                      const cv::Rect& limits, Depths& seen) const {
+                      const cv::Rect& limits, float scale, Depths& seen) const {
   thread_local std::vector<Eigen::Vector3f> image;  // u, v [px], 1/z [1/m]
   image.clear();
   const auto focal = static_cast<float>(camera_.focal_length);
   Eigen::Array2f low = Eigen::Array2f::Constant(1e9F), high = -low;
   for (const Eigen::Vector3f& point : points) {
     const float near = 1 / point.z();
-    image.emplace_back(static_cast<float>(camera_.center_u) + focal * (point.x() - eye_x) * near,
-                       static_cast<float>(camera_.center_v) + focal * point.y() * near, near);
+    image.emplace_back(
+        scale * (static_cast<float>(camera_.center_u) + focal * (point.x() - eye_x) * near),
+        scale * (static_cast<float>(camera_.center_v) + focal * point.y() * near), near);
     low = low.min(image.back().head<2>().array());
     high = high.max(image.back().head<2>().array());
   }
@@ -94,6 +101,10 @@ void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
     const Eigen::Vector2f ab = (b - a).head<2>(), ac = (c - a).head<2>();
     const float area = ab.x() * ac.y() - ab.y() * ac.x();
     if (area >= -1e-6F) continue;  // counter-clockwise from outside: seen from behind
+    // Shares of the corners b and c, linear in the image.
+    const float second_u = ac.y() / area, second_v = -ac.x() / area;
+    const float third_u = -ab.y() / area, third_v = ab.x() / area;
+    const float slope_b = b.z() - a.z(), slope_c = c.z() - a.z();
     const auto [least_u, most_u] = std::minmax({a.x(), b.x(), c.x()});
     const auto [least_v, most_v] = std::minmax({a.y(), b.y(), c.y()});
     const int first_u = std::max(seen.box.x, bounded(std::ceil(least_u)));
@@ -105,11 +116,10 @@ void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
       auto* triangle = seen.triangle.ptr<int>(v - seen.box.y);
       for (int u = first_u; u <= last_u; ++u) {
         const float du = static_cast<float>(u) - a.x(), dv = static_cast<float>(v) - a.y();
-        const float second = (du * ac.y() - dv * ac.x()) / area;
-        const float third = (ab.x() * dv - ab.y() * du) / area;
+        const float second = du * second_u + dv * second_v, third = du * third_u + dv * third_v;
         constexpr float kSlack = -1e-3F;
         if (second < kSlack || third < kSlack || 1 - second - third < kSlack) continue;
-        const float near = a.z() + second * (b.z() - a.z()) + third * (c.z() - a.z());
+        const float near = a.z() + second * slope_b + third * slope_c;
         if (near <= nearness[u - seen.box.x]) continue;
         nearness[u - seen.box.x] = near;
         triangle[u - seen.box.x] = static_cast<int>(t);
@@ -119,7 +129,7 @@ void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
 }
 
 ShadedView::Sums ShadedView::compare(const EdgeField& field,
-                                     const std::vector<Eigen::Vector3f>& points, float eye_x,
+                                     const std::vector<Eigen::Vector3f>& normals, float eye_x,
                                      const Depths& seen, const std::array<float, 3>& lamps,
                                      const std::array<Depths, 3>& lit) const {
   if (seen.box.area() < kFewestPixels) return {};
@@ -141,18 +151,18 @@ ShadedView::Sums ShadedView::compare(const EdgeField& field,
       const Eigen::Vector3f at(
           eye_x + (static_cast<float>(u + seen.box.x) - center_u) * depth / focal,
           (static_cast<float>(v + seen.box.y) - center_v) * depth / focal, depth);
-      const auto& corners = triangles_[static_cast<std::size_t>(seen.triangle.at<int>(v, u))];
-      const Eigen::Vector3f& corner = points[corners[0]];
-      const Eigen::Vector3f normal =
-          (points[corners[1]] - corner).cross(points[corners[2]] - corner).normalized();
+      const Eigen::Vector3f& normal =
+          normals[static_cast<std::size_t>(seen.triangle.at<int>(v, u))];
       float shade = 0;
       for (std::size_t i = 0; i < lamps.size(); ++i) {
         const Eigen::Vector3f to_lamp = Eigen::Vector3f(lamps[i], 0, 0) - at;
         const float cosine = normal.dot(to_lamp);
         if (cosine <= 0) continue;
         // Something else of the body may throw its shadow here.
-        const cv::Point cell(cvRound(center_u + focal * (at.x() - lamps[i]) / depth) - lit[i].box.x,
-                             v + seen.box.y - lit[i].box.y);
+        const float lamp_u = center_u + focal * (at.x() - lamps[i]) / depth;
+        const auto lamp_v = static_cast<float>(v + seen.box.y);
+        const cv::Point cell =
+            cv::Point(cvRound(kLampScale * lamp_u), cvRound(kLampScale * lamp_v)) - lit[i].box.tl();
         if (cell.x >= 0 && cell.y >= 0 && cell.x < lit[i].box.width && cell.y < lit[i].box.height &&
             lit[i].nearness.at<float>(cell) * depth > 1 + kShadowSlack)
           continue;

@@ -131,6 +131,7 @@ class Tracker::Impl {
     begin(beliefAt(camera_from_object, params_.start.position_sigma,
                    params_.start.rotation_sigma_deg * M_PI / 180),
           false);
+    proven_ = true;  // somebody knows
     beginLooks(Appearance{}.bright_inside);
     report_.state = TrackerState::kTracking;
     confirming_ = false;

@@ -32,8 +32,8 @@ class ShadedView {
   };
   struct Depths;
   void look(const std::vector<Eigen::Vector3f>& points, float eye_x, const cv::Rect& limits,
-            Depths& seen) const;
-  Sums compare(const EdgeField& field, const std::vector<Eigen::Vector3f>& points, float eye_x,
+            float scale, Depths& seen) const;
+  Sums compare(const EdgeField& field, const std::vector<Eigen::Vector3f>& normals, float eye_x,
                const Depths& seen, const std::array<float, 3>& lamps,
                const std::array<Depths, 3>& lit) const;
 
