@@ -16,21 +16,22 @@ constexpr double kPixelsPerSample = 15;         // neighbours share their errors
 constexpr double kFewestPixels = 60;            // of one eye
 constexpr double kLeastResidual = 0.05;         // of the brightness: what Lambert's law leaves
 constexpr float kGrossResidual = 60;            // [grey levels] something else is seen there
-constexpr float kLampScale = 0.5F;              // of the image, for what a lamp sees
-constexpr float kShadowSlack = 0.02F;           // of the depth, by which a surface may hide itself
+constexpr double kLargeBody = 35;      // [px] of the half of a body whose shadows may be coarse
+constexpr float kShadowSlack = 0.01F;  // of the depth a pixel, by which a surface may hide itself
 constexpr int kFits = 3;
 
 }  // namespace
 
 /// What is nearest in each pixel of a box, as seen from one place.
 struct ShadedView::Depths {
+  float scale = 1;  ///< of the image
   cv::Rect box;
   cv::Mat nearness;  ///< CV_32FC1 1/z [1/m], zero where nothing is seen
   cv::Mat triangle;  ///< CV_32SC1
 };
 
 ShadedView::ShadedView(const Mesh& mesh, const RectifiedStereoCamera& camera)
-    : camera_(camera), triangles_(mesh.triangles) {
+    : camera_(camera), radius_(radiusOf(mesh)), triangles_(mesh.triangles) {
   vertices_.reserve(mesh.vertices.size());
   for (const Eigen::Vector3d& vertex : mesh.vertices) vertices_.push_back(vertex.cast<float>());
 }
@@ -49,13 +50,15 @@ double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
   normals.reserve(triangles_.size());
   for (const auto& [a, b, c] : triangles_)
     normals.emplace_back((points[b] - points[a]).cross(points[c] - points[a]).normalized());
+  const bool coarse =
+      camera_.focal_length * radius_ > kLargeBody * camera_from_object.translation().z();
   std::array<float, 3> lamps{};
   std::array<Depths, 3> lit;
   const cv::Rect everywhere(-2000, -2000, 5000, 5000);
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     lamps[i] =
         static_cast<float>(0.5 * camera_.baseline + (static_cast<double>(i) - 1) * kLampSpacing);
-    look(points, lamps[i], everywhere, kLampScale, lit[i]);
+    look(points, lamps[i], everywhere, coarse ? 0.5F : 1.0F, lit[i]);
   }
   Sums all;
   for (std::size_t eye = 0; eye < 2; ++eye) {
@@ -77,6 +80,7 @@ double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
 /// @param scale of the image
 void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
                       const cv::Rect& limits, float scale, Depths& seen) const {
+  seen.scale = scale;
   thread_local std::vector<Eigen::Vector3f> image;  // u, v [px], 1/z [1/m]
   image.clear();
   const auto focal = static_cast<float>(camera_.focal_length);
@@ -162,9 +166,10 @@ ShadedView::Sums ShadedView::compare(const EdgeField& field,
         const float lamp_u = center_u + focal * (at.x() - lamps[i]) / depth;
         const auto lamp_v = static_cast<float>(v + seen.box.y);
         const cv::Point cell =
-            cv::Point(cvRound(kLampScale * lamp_u), cvRound(kLampScale * lamp_v)) - lit[i].box.tl();
+            cv::Point(cvRound(lit[i].scale * lamp_u), cvRound(lit[i].scale * lamp_v)) -
+            lit[i].box.tl();
         if (cell.x >= 0 && cell.y >= 0 && cell.x < lit[i].box.width && cell.y < lit[i].box.height &&
-            lit[i].nearness.at<float>(cell) * depth > 1 + kShadowSlack)
+            lit[i].nearness.at<float>(cell) * depth > 1 + kShadowSlack / lit[i].scale)
           continue;
         const float square = to_lamp.squaredNorm();
         shade += cosine / (square * std::sqrt(square));

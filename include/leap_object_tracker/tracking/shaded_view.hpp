@@ -38,6 +38,7 @@ class ShadedView {
                const std::array<Depths, 3>& lit) const;
 
   RectifiedStereoCamera camera_;
+  double radius_;  ///< [m]
   std::vector<Eigen::Vector3f> vertices_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
 };
