@@ -115,5 +115,53 @@ TEST_F(DrawnBox, supportsNoPoseWhereNothingIs) {
   EXPECT_LT(refined.support(), 0.1);
 }
 
+TEST_F(DrawnBox, isNotPulledByWhatHidesItFromOneEye) {
+  const PoseRefiner refiner(ContourParams(), camera_);
+  Pose straight = Pose::Identity();
+  straight.translation() << 0.02, 0, 0.15;
+  RectifiedStereoFrame frame = drawnFrame(object_, straight, camera_);
+  // A card, one edge of which runs beside the object's.
+  const Eigen::Vector3d side = straight * Eigen::Vector3d(0.015, 0, -0.025);
+  const int u = cvRound(camera_.leftPixel(side - Eigen::Vector3d(camera_.baseline, 0, 0)).x()) + 2;
+  frame.right = 4;
+  cv::rectangle(frame.right, cv::Rect(0, 0, u, camera_.size.height), cv::Scalar(190), cv::FILLED);
+  measurement_.observe(frame, {cv::Rect(260, 160, 140, 140), cv::Rect(220, 160, 140, 140)});
+  PosePrior prior{straight, Matrix6d::Zero()};
+  prior.information.diagonal() << Eigen::Vector3d::Constant(1 / (0.003 * 0.003)),
+      Eigen::Vector3d::Constant(1 / (0.03 * 0.03));
+  const RefinedPose refined =
+      refiner.refine(model_, measurement_.fields(), straight, prior, Appearance(), {6, 4, 3, 2.5});
+  const Twist error = cameraTwistBetween(straight, refined.camera_from_object);
+  EXPECT_LT(error.head<3>().norm(), 0.0005);
+  EXPECT_LT(error.tail<3>().norm(), 0.0015);
+  EXPECT_GT(refined.eyes[0].share(), 0.9);
+  EXPECT_LT(refined.eyes[1].share(), 0.5);
+  EXPECT_EQ(refined.bestEyeSupport(), refined.eyes[0].share());
+}
+
+TEST_F(DrawnBox, missesAnOutlineMoreWhereItWouldShow) {
+  const PoseRefiner refiner(ContourParams(), camera_);
+  Pose straight = Pose::Identity();
+  straight.translation() << 0.02, 0, 0.15;
+  const auto judged = [&](int beyond, std::uint8_t grey) {
+    RectifiedStereoFrame frame = drawnFrame(object_, straight, camera_);
+    for (int eye = 0; eye < 2; ++eye) {
+      Eigen::Vector3d corner = straight * Eigen::Vector3d(-0.015, 0, -0.025);
+      corner.x() -= eye * camera_.baseline;
+      const int u = cvRound(camera_.leftPixel(corner).x());
+      cv::Mat& image = eye == 0 ? frame.left : frame.right;
+      cv::rectangle(image, cv::Rect(beyond < 0 ? u - 8 : u - 2, 224, 10, 32), cv::Scalar(grey),
+                    cv::FILLED);
+    }
+    measurement_.observe(frame, {cv::Rect(260, 160, 140, 140), cv::Rect(220, 160, 140, 140)});
+    return refiner.refine(model_, measurement_.fields(), straight, {}, Appearance(), {});
+  };
+  // What is behind one side is as bright as the object, or that side is as dark as what is behind.
+  const RefinedPose bright = judged(-1, 200), dark = judged(1, 4);
+  EXPECT_NEAR(bright.support(), dark.support(), 0.1);
+  EXPECT_GT(dark.evidence, bright.evidence + 2);
+  EXPECT_GT(dark.strength(), bright.strength());
+}
+
 }  // namespace
 }  // namespace leap_object_tracker
