@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "leap_object_tracker/tracking/edge_profile.hpp"
+#include "leap_optics.hpp"
 #include "limb_shift.hpp"
 #include "line_neighbours.hpp"
 
@@ -39,10 +40,8 @@ constexpr double kSureContrast = 0.25;  // of the brightest, that an edge shows 
 constexpr double kFine = 2.6;           // [px] ranges below this are searched by fitted steps
 constexpr int kProfile = 7;             // [px] half length of a profile that steps are fitted to
 constexpr double kLargestShift = 2;     // [px] of a fitted step
-constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rectified image
 // [px^2] that smoothing, slopes by differences and bilinear interpolation add to its square.
 constexpr double kSearchBlur = 1.9;
-constexpr double kLampSpacing = 0.035;  // [m] along the baseline, the middle one between the eyes
 constexpr float kIgnoredCosine = 0.6F;
 // Share of the contour that an eye finds: so little in one eye and so much in the other mean that
 // something hides the object from the first.

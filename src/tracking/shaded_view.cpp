@@ -4,20 +4,20 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "leap_optics.hpp"
+
 namespace leap_object_tracker {
 namespace {
 
-constexpr double kLampSpacing = 0.035;          // [m] along the baseline
-constexpr float kNearest = 0.01F;               // [m] of a vertex
-constexpr float kSaturated = 250;               // grey level
-constexpr double kBlurU = 0.78, kBlurV = 1.08;  // [px] point spread of the rectified image
-constexpr int kRim = 2;                         // [px] of a silhouette that is left out
-constexpr double kPixelsPerSample = 15;         // neighbours share their errors
-constexpr double kFewestPixels = 60;            // of one eye
-constexpr double kLeastResidual = 0.05;         // of the brightness: what Lambert's law leaves
-constexpr float kGrossResidual = 60;            // [grey levels] something else is seen there
-constexpr double kLargeBody = 35;      // [px] of the half of a body whose shadows may be coarse
-constexpr float kShadowSlack = 0.01F;  // of the depth a pixel, by which a surface may hide itself
+constexpr float kNearest = 0.01F;        // [m] of a vertex that is drawn
+constexpr float kSaturated = 250;        // grey level
+constexpr int kRim = 2;                  // [px] of a silhouette that is left out
+constexpr double kPixelsPerSample = 15;  // neighbours share their errors
+constexpr double kFewestPixels = 60;     // of one eye
+constexpr double kLeastResidual = 0.05;  // of the brightness: what Lambert's law leaves
+constexpr float kGrossResidual = 60;     // [grey levels] something else is seen there
+constexpr double kLargeBody = 35;        // [px] of the half of a body whose shadows may be coarse
+constexpr float kShadowSlack = 0.01F;    // of the depth a pixel, by which a surface may hide itself
 constexpr int kFits = 3;
 
 }  // namespace
@@ -42,10 +42,7 @@ double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
   const Eigen::Vector3f origin = camera_from_object.translation().cast<float>();
   std::vector<Eigen::Vector3f> points;
   points.reserve(vertices_.size());
-  for (const Eigen::Vector3f& vertex : vertices_) {
-    points.emplace_back(rotation * vertex + origin);
-    if (points.back().z() < kNearest) return 0;
-  }
+  for (const Eigen::Vector3f& vertex : vertices_) points.emplace_back(rotation * vertex + origin);
   std::vector<Eigen::Vector3f> normals;
   normals.reserve(triangles_.size());
   for (const auto& [a, b, c] : triangles_)
@@ -54,7 +51,8 @@ double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
       camera_.focal_length * radius_ > kLargeBody * camera_from_object.translation().z();
   std::array<float, 3> lamps{};
   std::array<Depths, 3> lit;
-  const cv::Rect everywhere(-2000, -2000, 5000, 5000);
+  const cv::Size& size = camera_.size;
+  const cv::Rect everywhere(-size.width, -size.height, 3 * size.width, 3 * size.height);
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     lamps[i] =
         static_cast<float>(0.5 * camera_.baseline + (static_cast<double>(i) - 1) * kLampSpacing);
@@ -86,6 +84,10 @@ void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
   const auto focal = static_cast<float>(camera_.focal_length);
   Eigen::Array2f low = Eigen::Array2f::Constant(1e9F), high = -low;
   for (const Eigen::Vector3f& point : points) {
+    if (point.z() < kNearest) {
+      image.emplace_back(Eigen::Vector3f::Zero());
+      continue;
+    }
     const float near = 1 / point.z();
     image.emplace_back(
         scale * (static_cast<float>(camera_.center_u) + focal * (point.x() - eye_x) * near),
@@ -102,6 +104,7 @@ void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
     const Eigen::Vector3f &a = image[triangles_[t][0]], &b = image[triangles_[t][1]],
                           &c = image[triangles_[t][2]];
+    if (a.z() <= 0 || b.z() <= 0 || c.z() <= 0) continue;
     const Eigen::Vector2f ab = (b - a).head<2>(), ac = (c - a).head<2>();
     const float area = ab.x() * ac.y() - ab.y() * ac.x();
     if (area >= -1e-6F) continue;  // counter-clockwise from outside: seen from behind
