@@ -48,7 +48,8 @@ constexpr double kDoubtCost = 5;          // [nats] against a pose that says so
 constexpr double kLeastSupport = 0.40;    // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
 constexpr double kLearningSupport = 0.7;     // of a pose at which the object's looks are learned
-constexpr int kYoungFrames = 80;  // after a start, in which turned poses are looked at often
+constexpr int kFirstFrames = 8;   // after a start, in which turned poses are looked at every time
+constexpr int kYoungFrames = 80;  // the same, often
 constexpr int kYoungPeriod = 2, kOldPeriod = 12;  // [frames]
 constexpr double kTrustedLandmarks = 0.5;  // share of landmarks that make turned poses needless
 constexpr double kExact = 0.5;             // [px]
@@ -637,7 +638,9 @@ class Tracker::Impl {
   void considerTurned() {
     if (!object_.symmetry.trivial()) return;  // its likenesses are known
     ++tracked_frames_;
-    const int period = tracked_frames_ < kYoungFrames ? kYoungPeriod : kOldPeriod;
+    const int period = tracked_frames_ <= kFirstFrames  ? 1
+                       : tracked_frames_ < kYoungFrames ? kYoungPeriod
+                                                        : kOldPeriod;
     if (tracked_frames_ % period != 0 || features_.support(belief_.pose) > kTrustedLandmarks)
       return;
     const auto better =
