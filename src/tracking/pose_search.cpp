@@ -38,6 +38,7 @@ constexpr std::size_t kPromising = 16;   // poses that are refined to the end
 constexpr double kReach = 0.2;           // of a pose's error, as a share of the object's radius
 constexpr std::size_t kAsked = 3;        // places whose best pose is offered
 constexpr std::size_t kExactlySeen = 8;  // of the turned poses that are compared at last
+constexpr double kShadedReach = 60;      // [nats] by which their contour may be worse
 constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 // Of the best score that so much contour could have: less speaks against a pose. Without it, views
 // that show more contour would win.
@@ -528,8 +529,17 @@ RefinedPose PoseSearch::bestTurned(const RefinedPose& pose) const {
   tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) {
     refineExactly(refiner_, *model_, fields_, camera_.baseline, {}, looks[order[i]],
                   refined[order[i]]);
-    refined[order[i]].log_likelihood +=
-        shaded_view_.logLikelihood(fields_, refined[order[i]].camera_from_object);
+  });
+  // Shading decides between those that the contour leaves.
+  const double best =
+      refined[*std::min_element(order.begin(), order.end(), likelier)].log_likelihood;
+  order.erase(std::remove_if(
+                  order.begin(), order.end(),
+                  [&](std::size_t i) { return refined[i].log_likelihood < best - kShadedReach; }),
+              order.end());
+  tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) {
+    RefinedPose& pose_there = refined[order[i]];
+    pose_there.log_likelihood += shaded_view_.logLikelihood(fields_, pose_there.camera_from_object);
   });
   return refined[*std::min_element(order.begin(), order.end(), likelier)];
 }
