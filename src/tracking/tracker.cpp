@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 
 #include "leap_object_tracker/tracking/contour_measurement.hpp"
@@ -18,6 +17,7 @@
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/pose_search.hpp"
 #include "leap_object_tracker/tracking/turned_rivals.hpp"
+#include "tracking/best_first.hpp"
 
 namespace leap_object_tracker {
 namespace {
@@ -78,18 +78,6 @@ constexpr double kFoundRotationSigma = 0.05;   // [rad]
 double surprise(const PosePrior& prior, const Pose& pose) {
   const Twist shift = cameraTwistBetween(prior.mean, pose);
   return 0.5 * shift.dot(prior.information * shift);
-}
-
-/// Puts the indices of the `count` highest scores in front, the best ones first, of equal ones the
-/// lower index.
-template <class Scores>
-void putBestFirst(const Scores& scores, std::size_t count, std::vector<std::uint32_t>& order) {
-  order.resize(scores.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(),
-                    [&](std::uint32_t a, std::uint32_t b) {
-                      return scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
-                    });
 }
 
 void check(bool right, const char* message) {

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+
+#include "tracking/best_first.hpp"
 
 namespace leap_object_tracker {
 namespace {
@@ -50,14 +51,12 @@ std::vector<RefinedPose> TurnedRivals::likeliest(const Pose& pose, const std::ve
   std::vector<float> scores(poses.size());
   measurement.score(*model_, ContourMeasurement::Sharpness::kBlunt, poses.data(), poses.size(),
                     scores.data());
-  std::vector<std::size_t> order(scores.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return scores[a] > scores[b]; });
-  order.resize(std::min(kRefined, order.size()));
+  const std::size_t count = std::min(kRefined, scores.size());
+  std::vector<std::uint32_t> order;
+  putBestFirst(scores, count, order);
 
   std::vector<Pose> starts;
-  for (const std::size_t i : order) starts.push_back(turned[i]);
+  for (std::size_t i = 0; i < count; ++i) starts.push_back(turned[order[i]]);
   if (rival_) starts.push_back(pose * *rival_);
   starts.push_back(pose);
   std::vector<RefinedPose> refined(starts.size());

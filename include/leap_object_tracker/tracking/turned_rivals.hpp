@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -39,7 +38,7 @@ class TurnedRivals {
   const ContourModel* model_;
   const PoseRefiner* refiner_;
   ShadedView shaded_view_;
-  std::optional<Pose> rival_;  ///< from the object to the likeliest turned pose, in its own frame
+  std::optional<Pose> rival_;  ///< object_from_object of the likeliest turned pose
   double lead_ = 0;            ///< [nats] by which it was better, over all looks
 };
 
