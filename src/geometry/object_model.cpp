@@ -162,7 +162,7 @@ ObjectModel loadObject(const std::string& path) {
   const Shape shape = readShape(file);
   ObjectModel object;
   if (shape == Shape::kMesh) {
-    file.refuseUnknownKeys({"name", "shape", "mesh", "scale", "symmetry"});
+    file.refuseUnknownKeys({"name", "shape", "mesh", "scale", "symmetry", "textured"});
     const auto mesh_path = file.read<std::string>("mesh", "the path of an OBJ, STL, PLY or DAE");
     const double scale = file.has("scale") ? file.read<double>("scale", "a number above 0") : 1.0;
     if (!(scale > 0) || !std::isfinite(scale))
@@ -182,11 +182,12 @@ ObjectModel loadObject(const std::string& path) {
       file.complain("the mesh is " + std::to_string(diameter) +
                     " m across; sizes from 2 mm to 2 m are sensible: is 'scale' right?");
   } else {
-    file.refuseUnknownKeys({"name", "shape", "size", "symmetry"});
+    file.refuseUnknownKeys({"name", "shape", "size", "symmetry", "textured"});
     object = makePrimitive("", shape, readSize(file, shape));
   }
   object.name = file.read<std::string>("name", "a word");
   object.symmetry = readSymmetry(file, shape, object.size);
+  if (file.has("textured")) object.textured = file.read<bool>("textured", "true or false");
   return object;
 }
 

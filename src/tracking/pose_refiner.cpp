@@ -7,9 +7,11 @@
 #include <optional>
 
 #include "leap_object_tracker/tracking/edge_profile.hpp"
+#include "leap_object_tracker/tracking/textured_surface.hpp"
 #include "leap_optics.hpp"
 #include "limb_shift.hpp"
 #include "line_neighbours.hpp"
+#include "sampler.hpp"
 
 namespace leap_object_tracker {
 namespace {
@@ -37,6 +39,7 @@ constexpr double kDarkShare = 0.2, kBrightShare = 0.6;
 constexpr double kCrowdedRange = 0.75, kCrowdedReach = 1.6;
 constexpr double kInnerContrast = 0.5;  // of an outline before another part of the body, likewise
 constexpr double kSureContrast = 0.25;  // of the brightest, that an edge shows without fail
+constexpr double kTextureRange = 4.5;   // [px] ranges below this look at the texture too
 constexpr double kFine = 2.6;           // [px] ranges below this are searched by fitted steps
 constexpr int kProfile = 7;             // [px] half length of a profile that steps are fitted to
 constexpr double kLargestShift = 2;     // [px] of a fitted step
@@ -54,44 +57,14 @@ constexpr double kCreaseDoubt = 1.2;
 // left.
 constexpr double kIndependentErrors = 0.4;
 
-/// Grey values of a field at sub-pixel places of the whole image.
-template <class Value>
-class Sampler {
- public:
-  Sampler(const EdgeField& field, const cv::Mat& image, float scale)
-      : image_(image),
-        scale_(scale),
-        u0_(static_cast<float>(field.region().x)),
-        v0_(static_cast<float>(field.region().y)),
-        last_u_(static_cast<float>(image_.cols - 1)),
-        last_v_(static_cast<float>(image_.rows - 1)) {}
-
-  bool contains(float u, float v) const {
-    return u >= u0_ && v >= v0_ && u < u0_ + last_u_ && v < v0_ + last_v_;
-  }
-
-  /// Bilinear, in 8-bit grey levels; the place must be contained.
-  float operator()(float u, float v) const {
-    const float x = u - u0_, y = v - v0_;
-    const int column = static_cast<int>(x), row = static_cast<int>(y);
-    const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
-    const auto* top = image_.ptr<Value>(row) + column;
-    const auto* bottom = image_.ptr<Value>(row + 1) + column;
-    const float upper = static_cast<float>(top[0]) + fx * static_cast<float>(top[1] - top[0]);
-    const float lower =
-        static_cast<float>(bottom[0]) + fx * static_cast<float>(bottom[1] - bottom[0]);
-    return (upper + fy * (lower - upper)) * scale_;
-  }
-
- private:
-  const cv::Mat& image_;
-  float scale_;
-  float u0_, v0_, last_u_, last_v_;
-};
-
 double tukeyWeight(double residual, double limit) {
   const double x = residual / limit;
   return std::abs(x) >= 1 ? 0 : (1 - x * x) * (1 - x * x);
+}
+
+SurfaceEvidence evidenceOf(const TexturedSurface* surface, const std::array<EdgeField, 2>& fields,
+                           const Pose& pose) {
+  return surface != nullptr ? surface->evidence(fields, pose) : SurfaceEvidence();
 }
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
@@ -505,6 +478,11 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
       information.noalias() += weight * m.jacobian * m.jacobian.transpose();
       gradient += weight * m.offset * m.jacobian;
     }
+    if (range < kTextureRange) {
+      const SurfaceEvidence texture = evidenceOf(appearance.texture, fields, pose);
+      information += texture.information;
+      gradient += texture.gradient;
+    }
     // Directions that neither edges nor prior bind stay where they are.
     const Twist step = (information + damping).ldlt().solve(gradient);
     if (!step.allFinite()) break;
@@ -563,6 +541,9 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     misfit += m.samples * std::log(std::clamp(m.noise, 1.0, 20.0));
   }
   if (fitted > 0) result.log_likelihood -= kMisfitWeight * all * misfit / fitted;
+  const SurfaceEvidence texture = evidenceOf(appearance.texture, fields, pose);
+  result.information += texture.information;
+  result.log_likelihood += texture.log_likelihood;
   result.bright_inside = judged > 0 ? bright / judged : 0.5;
   return result;
 }

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "depth_view.hpp"
 #include "leap_optics.hpp"
 
 namespace leap_object_tracker {
 namespace {
 
-constexpr float kNearest = 0.01F;        // [m] of a vertex that is drawn
 constexpr float kSaturated = 250;        // grey level
 constexpr int kRim = 2;                  // [px] of a silhouette that is left out
 constexpr double kPixelsPerSample = 15;  // neighbours share their errors
@@ -21,14 +21,6 @@ constexpr float kShadowSlack = 0.01F;    // of the depth a pixel, by which a sur
 constexpr int kFits = 3;
 
 }  // namespace
-
-/// What is nearest in each pixel of a box, as seen from one place.
-struct ShadedView::Depths {
-  float scale = 1;  ///< of the image
-  cv::Rect box;
-  cv::Mat nearness;  ///< CV_32FC1 1/z [1/m], zero where nothing is seen
-  cv::Mat triangle;  ///< CV_32SC1
-};
 
 ShadedView::ShadedView(const Mesh& mesh, const RectifiedStereoCamera& camera)
     : camera_(camera), radius_(radiusOf(mesh)), triangles_(mesh.triangles) {
@@ -50,20 +42,20 @@ double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
   const bool coarse =
       camera_.focal_length * radius_ > kLargeBody * camera_from_object.translation().z();
   std::array<float, 3> lamps{};
-  std::array<Depths, 3> lit;
+  std::array<DepthView, 3> lit;
   const cv::Size& size = camera_.size;
   const cv::Rect everywhere(-size.width, -size.height, 3 * size.width, 3 * size.height);
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     lamps[i] =
         static_cast<float>(0.5 * camera_.baseline + (static_cast<double>(i) - 1) * kLampSpacing);
-    look(points, lamps[i], everywhere, coarse ? 0.5F : 1.0F, lit[i]);
+    drawDepths(points, triangles_, camera_, lamps[i], everywhere, coarse ? 0.5F : 1.0F, lit[i]);
   }
   Sums all;
   for (std::size_t eye = 0; eye < 2; ++eye) {
     if (!fields[eye].seen()) continue;
     const auto eye_x = static_cast<float>(eye == 0 ? 0 : camera_.baseline);
-    Depths seen;
-    look(points, eye_x, fields[eye].region(), 1, seen);
+    DepthView seen;
+    drawDepths(points, triangles_, camera_, eye_x, fields[eye].region(), 1, seen);
     const Sums sums = compare(fields[eye], normals, eye_x, seen, lamps, lit);
     all.residual += sums.residual;
     all.brightness += sums.brightness;
@@ -74,71 +66,10 @@ double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
          std::log(all.residual / all.brightness + kLeastResidual * kLeastResidual);
 }
 
-/// Draws the triangles that look at a place on the baseline, as a camera there would see them.
-/// @param scale of the image
-void ShadedView::look(const std::vector<Eigen::Vector3f>& points, float eye_x,
-                      const cv::Rect& limits, float scale, Depths& seen) const {
-  seen.scale = scale;
-  thread_local std::vector<Eigen::Vector3f> image;  // u, v [px], 1/z [1/m]
-  image.clear();
-  const auto focal = static_cast<float>(camera_.focal_length);
-  Eigen::Array2f low = Eigen::Array2f::Constant(1e9F), high = -low;
-  for (const Eigen::Vector3f& point : points) {
-    if (point.z() < kNearest) {
-      image.emplace_back(Eigen::Vector3f::Zero());
-      continue;
-    }
-    const float near = 1 / point.z();
-    image.emplace_back(
-        scale * (static_cast<float>(camera_.center_u) + focal * (point.x() - eye_x) * near),
-        scale * (static_cast<float>(camera_.center_v) + focal * point.y() * near), near);
-    low = low.min(image.back().head<2>().array());
-    high = high.max(image.back().head<2>().array());
-  }
-  const auto bounded = [](float value) { return static_cast<int>(std::clamp(value, -1e4F, 1e4F)); };
-  seen.box = cv::Rect(cv::Point(bounded(low.x()) - 2, bounded(low.y()) - 2),
-                      cv::Point(bounded(high.x()) + 3, bounded(high.y()) + 3)) &
-             limits;
-  seen.nearness = cv::Mat(seen.box.size(), CV_32FC1, cv::Scalar(0));
-  seen.triangle = cv::Mat(seen.box.size(), CV_32SC1);
-  for (std::size_t t = 0; t < triangles_.size(); ++t) {
-    const Eigen::Vector3f &a = image[triangles_[t][0]], &b = image[triangles_[t][1]],
-                          &c = image[triangles_[t][2]];
-    if (a.z() <= 0 || b.z() <= 0 || c.z() <= 0) continue;
-    const Eigen::Vector2f ab = (b - a).head<2>(), ac = (c - a).head<2>();
-    const float area = ab.x() * ac.y() - ab.y() * ac.x();
-    if (area >= -1e-6F) continue;  // counter-clockwise from outside: seen from behind
-    // Shares of the corners b and c, linear in the image.
-    const float second_u = ac.y() / area, second_v = -ac.x() / area;
-    const float third_u = -ab.y() / area, third_v = ab.x() / area;
-    const float slope_b = b.z() - a.z(), slope_c = c.z() - a.z();
-    const auto [least_u, most_u] = std::minmax({a.x(), b.x(), c.x()});
-    const auto [least_v, most_v] = std::minmax({a.y(), b.y(), c.y()});
-    const int first_u = std::max(seen.box.x, bounded(std::ceil(least_u)));
-    const int last_u = std::min(seen.box.x + seen.box.width - 1, bounded(std::floor(most_u)));
-    const int first_v = std::max(seen.box.y, bounded(std::ceil(least_v)));
-    const int last_v = std::min(seen.box.y + seen.box.height - 1, bounded(std::floor(most_v)));
-    for (int v = first_v; v <= last_v; ++v) {
-      auto* nearness = seen.nearness.ptr<float>(v - seen.box.y);
-      auto* triangle = seen.triangle.ptr<int>(v - seen.box.y);
-      for (int u = first_u; u <= last_u; ++u) {
-        const float du = static_cast<float>(u) - a.x(), dv = static_cast<float>(v) - a.y();
-        const float second = du * second_u + dv * second_v, third = du * third_u + dv * third_v;
-        constexpr float kSlack = -1e-3F;
-        if (second < kSlack || third < kSlack || 1 - second - third < kSlack) continue;
-        const float near = a.z() + second * slope_b + third * slope_c;
-        if (near <= nearness[u - seen.box.x]) continue;
-        nearness[u - seen.box.x] = near;
-        triangle[u - seen.box.x] = static_cast<int>(t);
-      }
-    }
-  }
-}
-
 ShadedView::Sums ShadedView::compare(const EdgeField& field,
                                      const std::vector<Eigen::Vector3f>& normals, float eye_x,
-                                     const Depths& seen, const std::array<float, 3>& lamps,
-                                     const std::array<Depths, 3>& lit) const {
+                                     const DepthView& seen, const std::array<float, 3>& lamps,
+                                     const std::array<DepthView, 3>& lit) const {
   if (seen.box.area() < kFewestPixels) return {};
   cv::Mat inside;
   cv::erode(seen.nearness > 0, inside,

@@ -16,6 +16,7 @@
 #include "leap_object_tracker/tracking/pose_belief.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/pose_search.hpp"
+#include "leap_object_tracker/tracking/textured_surface.hpp"
 #include "leap_object_tracker/tracking/turned_rivals.hpp"
 #include "tracking/best_first.hpp"
 
@@ -52,12 +53,16 @@ constexpr int kFirstFrames = 8;   // after a start, in which turned poses are lo
 constexpr int kYoungFrames = 80;  // the same, often
 constexpr int kYoungPeriod = 2, kOldPeriod = 12;  // [frames]
 constexpr double kTrustedLandmarks = 0.5;  // share of landmarks that make turned poses needless
-constexpr double kExact = 0.5;             // [px]
-constexpr int kPatience = 3;               // frames below it before the object counts as lost
-constexpr double kFoundSupport = 0.68;     // share of the contour that a found pose must have
-constexpr double kSureStart = 0.85;        // support that needs no other frame to prove itself
-constexpr double kRefoundSupport = 0.6;    // the same, close to where the object was last
-constexpr double kRefoundReach = 0.03;     // [m]
+constexpr double kTextureSupport = 0.6;    // share of the learned texture, to stand by a pose
+constexpr double kTextureLearningSupport = 0.78;  // of a pose at which texture is learned
+constexpr int kSettled = 4;                       // such frames after a start before it is
+constexpr double kExact = 0.5;                    // [px]
+constexpr double kNothingLeft = 0.15;             // support at which the object is lost at once
+constexpr int kPatience = 3;             // frames below it before the object counts as lost
+constexpr double kFoundSupport = 0.68;   // share of the contour that a found pose must have
+constexpr double kSureStart = 0.85;      // support that needs no other frame to prove itself
+constexpr double kRefoundSupport = 0.6;  // the same, close to where the object was last
+constexpr double kRefoundReach = 0.03;   // [m]
 constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
 constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;    // [nats/px] once, and until then
 constexpr double kFoundInside = 0.3;                 // share of the contour inside the images
@@ -98,6 +103,7 @@ class Tracker::Impl {
         budget_(params.filter),
         measurement_(params.contour, params.eyes, camera),
         refiner_(params.contour, camera),
+        surface_(object, camera),
         features_(params, object_, camera),
         search_(params, object_, model_, camera),
         rivals_(object_, model_, refiner_, camera),
@@ -185,7 +191,13 @@ class Tracker::Impl {
         belief_.pose = *known, initializeFilter();
     }
     features_.observe(frame, where, belief_);
-    if (!features_.alone()) measurement_.observe(frame, where);
+    if (!features_.alone()) {
+      measurement_.observe(frame, where);
+      if (params_.measurement != Measurement::kContour) {
+        surface_.look(measurement_.fields(), belief_.pose);
+        appearance_.texture = &surface_;
+      }
+    }
     report_.edges_ms = millisecondsSince(started);
 
     started = Clock::now();
@@ -260,7 +272,7 @@ class Tracker::Impl {
   /// the search tells, more and more seldom as long as it agrees.
   void askForSecondOpinion(const RectifiedStereoFrame& frame) {
     if (features_.alone() || report_.support >= kSureSupport ||
-        features_.support(belief_.pose) > kTrustedLandmarks) {
+        features_.support(belief_.pose) > kTrustedLandmarks || texture_support_ > kTextureSupport) {
       frames_to_opinion_ = opinion_period_ = kFirstOpinion;
       return;
     }
@@ -305,6 +317,9 @@ class Tracker::Impl {
     belief_ = belief;
     initializeFilter();
     features_.restart(sure);
+    if (!sure) surface_.forget();
+    learned_frames_ = 0;
+    texture_support_ = 0;
     usual_residual_ = 0;
     frames_to_opinion_ = opinion_period_ = kFirstOpinion;
     weak_frames_ = 0;
@@ -631,10 +646,13 @@ class Tracker::Impl {
                                                         : kOldPeriod;
     if (tracked_frames_ % period != 0 || features_.support(belief_.pose) > kTrustedLandmarks)
       return;
+    Appearance plain = appearance_;
+    plain.texture = nullptr;  // of the side that is taken for the seen one
     const auto better =
-        rivals_.look(belief_.pose, search_.turned(belief_.pose), measurement_, appearance_);
+        rivals_.look(belief_.pose, search_.turned(belief_.pose), measurement_, plain);
     if (!better) return;
     const PoseBelief old = belief_;
+    surface_.forget();
     belief_ = beliefAt(*better, kFoundPositionSigma, kFoundRotationSigma);
     belief_.velocity = old.velocity;
     initializeFilter();
@@ -644,6 +662,8 @@ class Tracker::Impl {
   void takeOver(const RefinedPose& refined) {
     const double landmark_support = features_.support(refined.camera_from_object);
     report_.support = features_.alone() ? landmark_support : refined.support();
+    texture_support_ =
+        features_.alone() ? 0 : surface_.support(measurement_.fields(), refined.camera_from_object);
     // What was never seen clearly since the start may be something else.
     const double strength = features_.alone() ? kProvenStrength : refined.strength();
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
@@ -651,6 +671,7 @@ class Tracker::Impl {
         (proven_ || strength >= kLeastStrength) &&
         !features_.contradict(refined.camera_from_object, refined.bestEyeSupport()) &&
         (report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
+         texture_support_ >= kTextureSupport ||
          (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_));
     if (confirming_) {
       confirming_ = false;
@@ -667,10 +688,12 @@ class Tracker::Impl {
                             : refined.residual;
       if (!features_.alone() && report_.support > kLearningSupport)
         refiner_.learn(model_, measurement_.fields(), belief_.pose, appearance_);
+      if (report_.support > kTextureLearningSupport && ++learned_frames_ > kSettled)
+        surface_.learn(measurement_.fields(), belief_.pose);
       weak_frames_ = 0;
       last_seen_ = remembered_ = belief_.pose;
       report_.state = TrackerState::kTracking;
-    } else if (++weak_frames_ >= kPatience ||
+    } else if (++weak_frames_ >= kPatience || report_.support < kNothingLeft ||
                belief_.poseCovariance().topLeftCorner<3, 3>().diagonal().maxCoeff() >
                    kLostSpread * kLostSpread) {
       report_.state = TrackerState::kLost;
@@ -687,6 +710,7 @@ class Tracker::Impl {
   ParticleBudget budget_;
   ContourMeasurement measurement_;
   PoseRefiner refiner_;
+  TexturedSurface surface_;
   FeatureTracking features_;
   PoseSearch search_;
   TurnedRivals rivals_;
@@ -703,6 +727,8 @@ class Tracker::Impl {
   Matrix6d leverage_ = Matrix6d::Zero();  ///< of the last supported pose
   int frames_to_opinion_ = kFirstOpinion, opinion_period_ = kFirstOpinion;
   int frames_lost_ = 0;
+  int learned_frames_ = 0;  ///< in which texture could be learned
+  double texture_support_ = 0;
   bool fresh_ = false;
   bool proven_ = false;             ///< seen clearly since the start
   bool confirming_ = false;         ///< the last search found something

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "leap_object_tracker/geometry/mesh.hpp"
@@ -17,7 +18,8 @@ struct ObjectModel {
                                                    ///< prism: side height -; mesh: zero
   Mesh mesh;                                       ///< always filled
   Symmetry symmetry;
-  std::string mesh_path;  ///< absolute; empty for primitives
+  std::optional<bool> textured;  ///< whether its surface carries a texture; nothing: to be seen
+  std::string mesh_path;         ///< absolute; empty for primitives
 };
 
 /// Reads an object file (README, "Objects").

@@ -5,6 +5,8 @@
 
 namespace leap_object_tracker {
 
+class TexturedSurface;
+
 /// How bright the object and what lies beside its outline are: histograms of grey values inside and
 /// outside, learned while the object is tracked (as the colour statistics of Prisacariu and Reid,
 /// IJCV 2012, section 3). Bins are even in the square root of the grey value, on which shot noise
@@ -36,6 +38,7 @@ class GreyModel {
 struct Appearance {
   double bright_inside = 0.7;  ///< share of the outline on whose inner side the image is brighter
   GreyModel grey;
+  const TexturedSurface* texture = nullptr;  ///< what of it is in sight; null: not known
 };
 
 }  // namespace leap_object_tracker

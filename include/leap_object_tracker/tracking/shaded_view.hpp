@@ -10,6 +10,8 @@
 
 namespace leap_object_tracker {
 
+struct DepthView;
+
 /// How well the grey values of an image agree with a matt body of one brightness at a pose, lit by
 /// the three lamps of the device: tells a body from its turned self where their outlines are alike.
 /// Of a textured body it says little, of either.
@@ -30,12 +32,9 @@ class ShadedView {
   struct Sums {
     double residual = 0, brightness = 0, pixels = 0;
   };
-  struct Depths;
-  void look(const std::vector<Eigen::Vector3f>& points, float eye_x, const cv::Rect& limits,
-            float scale, Depths& seen) const;
   Sums compare(const EdgeField& field, const std::vector<Eigen::Vector3f>& normals, float eye_x,
-               const Depths& seen, const std::array<float, 3>& lamps,
-               const std::array<Depths, 3>& lit) const;
+               const DepthView& seen, const std::array<float, 3>& lamps,
+               const std::array<DepthView, 3>& lit) const;
 
   RectifiedStereoCamera camera_;
   double radius_;  ///< [m]
