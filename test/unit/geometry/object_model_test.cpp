@@ -41,6 +41,14 @@ TEST_F(ObjectFile, findsItsMeshBesideItself) {
   EXPECT_TRUE(part.symmetry.trivial());
 }
 
+TEST_F(ObjectFile, mayStateWhetherItIsTextured) {
+  const std::string box = "name: a\nshape: box\nsize: [1, 1, 1]\n";
+  EXPECT_FALSE(load(box).textured.has_value());
+  EXPECT_EQ(load(box + "textured: true\n").textured, true);
+  EXPECT_EQ(load(box + "textured: false\n").textured, false);
+  EXPECT_THAT(complaintAbout(box + "textured: a little\n"), HasSubstr("textured"));
+}
+
 TEST_F(ObjectFile, mayStateItsSymmetry) {
   EXPECT_TRUE(load("name: a\nshape: box\nsize: [1, 1, 1]\nsymmetry: none\n").symmetry.trivial());
   EXPECT_EQ(load("name: a\nshape: box\nsize: [1, 1, 1]\n"

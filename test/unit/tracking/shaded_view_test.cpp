@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "cast_body.hpp"
 #include "drawn_box.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/turned_rivals.hpp"
@@ -14,77 +15,6 @@ namespace leap_object_tracker {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kLamps[] = {-0.015, 0.02, 0.055};  // [m] along the baseline
-
-struct Hit {
-  double distance = std::numeric_limits<double>::infinity();
-  Vector3d normal = Vector3d::Zero();
-};
-
-/// Nearest triangle along a ray (Moller and Trumbore 1997).
-Hit cast(const std::vector<std::array<Vector3d, 3>>& triangles, const Vector3d& from,
-         const Vector3d& direction) {
-  Hit hit;
-  for (const auto& [a, b, c] : triangles) {
-    const Vector3d ab = b - a, ac = c - a, p = direction.cross(ac);
-    const double scale = ab.dot(p);
-    if (std::abs(scale) < 1e-15) continue;
-    const Vector3d to = from - a;
-    const double u = to.dot(p) / scale, v = direction.dot(to.cross(ab)) / scale;
-    const double distance = ac.dot(to.cross(ab)) / scale;
-    if (u < 0 || v < 0 || u + v > 1 || distance < 1e-6 || distance >= hit.distance) continue;
-    hit = {distance, ab.cross(ac).normalized()};
-  }
-  return hit;
-}
-
-struct Look {
-  bool shadows = true;
-  double scale = 0.6;  ///< grey levels of a white surface square to a lamp, times metres squared
-  double checks = 0;   ///< [m] of squares, every other one darker; 0: plain
-  double in_eyes = 2;
-};
-
-/// A matt body lit by three lamps, by ray casting.
-RectifiedStereoFrame castFrame(const Mesh& mesh, const Pose& pose,
-                               const RectifiedStereoCamera& camera, const Look& look = {}) {
-  std::vector<std::array<Vector3d, 3>> triangles;
-  for (const auto& t : mesh.triangles)
-    triangles.push_back(
-        {pose * mesh.vertices[t[0]], pose * mesh.vertices[t[1]], pose * mesh.vertices[t[2]]});
-  RectifiedStereoFrame frame;
-  frame.stamp = stampFromSeconds(1);
-  for (int eye = 0; eye < look.in_eyes; ++eye) {
-    cv::Mat& image = eye == 0 ? frame.left : frame.right;
-    image = cv::Mat(camera.size, CV_8UC1, cv::Scalar(4));
-    const Vector3d origin(eye * camera.baseline, 0, 0);
-    for (int v = 160; v < 320; ++v)
-      for (int u = 220; u < 420; ++u) {
-        const Vector3d ray((u - camera.center_u) / camera.focal_length,
-                           (v - camera.center_v) / camera.focal_length, 1);
-        const Hit hit = cast(triangles, origin, ray);
-        if (std::isinf(hit.distance)) continue;
-        const Vector3d at = origin + hit.distance * ray;
-        double light = 0;
-        for (const double lamp : kLamps) {
-          const Vector3d to = Vector3d(lamp, 0, 0) - at;
-          const double cosine = hit.normal.dot(to.normalized());
-          if (cosine <= 0) continue;
-          if (look.shadows && cast(triangles, at + 1e-5 * hit.normal, to).distance < 1) continue;
-          light += look.scale * cosine / to.squaredNorm();
-        }
-        if (look.checks > 0) {
-          const Vector3d own = pose.inverse() * at / look.checks;
-          const auto cell = [](double x) { return static_cast<int>(std::floor(x + 0.01)); };
-          if (((cell(own.x()) + cell(own.y()) + cell(own.z())) & 1) != 0) light *= 0.25;
-        }
-        image.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::min(255.0, 4 + light));
-      }
-    cv::GaussianBlur(image, image, cv::Size(7, 7), 0.78, 1.08);
-  }
-  return frame;
-}
 
 /// Two boxes as one mesh: a plate and a wall on it that stands towards -z.
 Mesh plateWithWall() {
