@@ -41,7 +41,8 @@ constexpr float kUnlikeEyes = 0.2F;  // share of the brightness by which eyes ma
 // Share of the smooth surface that is textured, of an object that is said to be, and of another.
 constexpr float kLeastShare = 0.03F, kClearShare = 0.06F;
 constexpr float kForgetting = 0.9F;  // of that share, a look
-constexpr float kSmoothPixels = 40;  // that tell it
+constexpr int kCountEvery = 3;       // [px] both ways, for it
+constexpr float kSmoothPixels = 20;  // that tell it
 constexpr int kIdlePeriod = 12;      // [frames] between looks at an object without texture
 constexpr std::size_t kFewest = 30;  // places that say something
 constexpr std::size_t kEnough = 60;  // learned ones that carry a pose
@@ -318,39 +319,49 @@ bool TexturedSurface::bothSee(int u, int v) const {
 void TexturedSurface::findTexture(const std::array<EdgeField, 2>& fields) {
   spots_.clear();
   const DepthView& seen = views_->eyes[0];
-  const SmoothImage left(fields[0]), right(fields[1]);
+  const SmoothImage right(fields[1]);
   thread_local std::vector<Spot> found;
   found.clear();
   smooth_ *= kForgetting;
   textured_ *= kForgetting;
-  for (int v = 0; v < seen.box.height; ++v)
-    for (int u = 0; u < seen.box.width; ++u) {
-      const float near = seen.nearness.at<float>(v, u);
-      if (near <= 0) continue;
-      const auto at_u = static_cast<float>(u + seen.box.x);
-      const auto at_v = static_cast<float>(v + seen.box.y);
-      if (!left.contains(at_u, at_v)) continue;
-      // One of four pixels tells the share.
-      const bool counts = ((u | v) & 1) == 0 &&
+  const cv::Mat& smooth = fields[0].smooth();
+  const cv::Point shift = seen.box.tl() - fields[0].region().tl();
+  const int first_u = std::max(0, 1 - shift.x), first_v = std::max(0, 1 - shift.y);
+  const int last_u = std::min(seen.box.width, smooth.cols - 1 - shift.x);
+  const int last_v = std::min(seen.box.height, smooth.rows - 1 - shift.y);
+  for (int v = first_v; v < last_v; ++v) {
+    const auto* nearness = seen.nearness.ptr<float>(v);
+    const auto* here = smooth.ptr<std::int16_t>(v + shift.y) + shift.x;
+    const auto* above = smooth.ptr<std::int16_t>(v + shift.y - 1) + shift.x;
+    const auto* below = smooth.ptr<std::int16_t>(v + shift.y + 1) + shift.x;
+    for (int u = first_u; u < last_u; ++u) {
+      if (nearness[u] <= 0) continue;
+      // Some pixels tell the share.
+      const bool counts = u % kCountEvery == 0 && v % kCountEvery == 0 &&
                           smoothAround(seen, views_->normals, u, v, kSmoothTurn, kFarFromEdges);
       if (counts) smooth_ += 1;
-      const float grey = left(at_u, at_v);
-      if (grey > kSaturated) continue;
+      const float grey = static_cast<float>(here[u]) / 16;
+      const float slope = std::hypot(static_cast<float>(here[u + 1] - here[u - 1]),
+                                     static_cast<float>(below[u] - above[u])) /
+                          32;
+      if (slope < kSlopeOnFlat * grey || grey > kSaturated) continue;
       const float noise = fields[0].slopeNoise(grey);
-      const float slope = left.slope(at_u, at_v).norm();
-      if (slope < kSlopeOnFlat * grey || slope < kTextureNoise * noise ||
+      if (slope < kTextureNoise * noise ||
           !smoothAround(seen, views_->normals, u, v,
                         slope < kSlopeOnCurved * grey ? kFlatTurn : kSmoothTurn) ||
           !bothSee(u, v))
         continue;
       const float other_u =
-          at_u - static_cast<float>(camera_.focal_length * camera_.baseline) * near;
-      if (!right.contains(other_u, at_v) ||
-          std::abs(right(other_u, at_v) - grey) > kUnlikeEyes * grey + kTextureNoise * noise)
+          static_cast<float>(u + seen.box.x) -
+          static_cast<float>(camera_.focal_length * camera_.baseline) * nearness[u];
+      const auto other_v = static_cast<float>(v + seen.box.y);
+      if (!right.contains(other_u, other_v) ||
+          std::abs(right(other_u, other_v) - grey) > kUnlikeEyes * grey + kTextureNoise * noise)
         continue;
       if (counts) textured_ += 1;
       found.push_back({u, v, slope});
     }
+  }
   if (found.size() < kFewest) return;
   int cell = 1;
   while (found.size() > kMost * static_cast<std::size_t>(cell * cell)) ++cell;
