@@ -34,11 +34,12 @@ constexpr int kChildren = 20;  // random steps of each, a round
 constexpr int kRounds = 4;
 constexpr std::size_t kRefinedAtLikely = 8;
 constexpr std::size_t kRefinedElsewhere = 2;
-constexpr std::size_t kPromising = 16;   // poses that are refined to the end
-constexpr double kReach = 0.2;           // of a pose's error, as a share of the object's radius
-constexpr std::size_t kAsked = 3;        // places whose best pose is offered
-constexpr std::size_t kExactlySeen = 8;  // of the turned poses that are compared at last
-constexpr double kShadedReach = 60;      // [nats] by which their contour may be worse
+constexpr std::size_t kPromising = 16;    // poses that are refined to the end
+constexpr double kReach = 0.2;            // of a pose's error, as a share of the object's radius
+constexpr std::size_t kAsked = 3;         // places whose best pose is offered
+constexpr double kHopelessSupport = 0.5;  // of a pose that turning it will not save
+constexpr std::size_t kExactlySeen = 8;   // of the turned poses that are compared at last
+constexpr double kShadedReach = 60;       // [nats] by which their contour may be worse
 constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 // Of the best score that so much contour could have: less speaks against a pose. Without it, views
 // that show more contour would win.
@@ -463,6 +464,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
           return (place - other).norm() < model_->radius();
         }))
       continue;
+    if (candidate.support() < kHopelessSupport) continue;
     asked.push_back(place);
     const RefinedPose settled = bestTurned(candidate);
     const double depth = settled.camera_from_object.translation().z();
@@ -471,7 +473,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     if (!best) best = settled;
     if (asked.size() >= kAsked) break;
   }
-  return best;
+  return best ? best : std::optional<RefinedPose>(refined.front());
 }
 
 /// Best first, none of them within `apart` [rad] of a better one.
