@@ -60,7 +60,7 @@ constexpr double kExact = 0.5;                    // [px]
 constexpr double kNothingLeft = 0.15;             // support at which the object is lost at once
 constexpr int kPatience = 3;             // frames below it before the object counts as lost
 constexpr double kFoundSupport = 0.68;   // share of the contour that a found pose must have
-constexpr double kSureStart = 0.85;      // support that needs no other frame to prove itself
+constexpr double kSureStart = 0.80;      // support that needs no other frame to prove itself
 constexpr double kRefoundSupport = 0.6;  // the same, close to where the object was last
 constexpr double kRefoundReach = 0.03;   // [m]
 constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
