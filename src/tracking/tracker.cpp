@@ -106,7 +106,7 @@ class Tracker::Impl {
         surface_(object, camera),
         features_(params, object_, camera),
         search_(params, object_, model_, camera),
-        rivals_(object_, model_, refiner_, camera),
+        rivals_(object_.symmetry, model_, refiner_, search_.shadedView(), camera.baseline),
         arena_(std::max(1, params.threads)) {
     check(camera.focal_length > 0 && camera.baseline > 0 && camera.size.area() > 0,
           "tracker: the camera needs a focal length, a baseline and a size");
@@ -693,7 +693,8 @@ class Tracker::Impl {
       weak_frames_ = 0;
       last_seen_ = remembered_ = belief_.pose;
       report_.state = TrackerState::kTracking;
-    } else if (++weak_frames_ >= kPatience || report_.support < kNothingLeft ||
+    } else if (++weak_frames_ >= kPatience ||
+               (report_.support < kNothingLeft && !features_.alone()) ||
                belief_.poseCovariance().topLeftCorner<3, 3>().diagonal().maxCoeff() >
                    kLostSpread * kLostSpread) {
       report_.state = TrackerState::kLost;

@@ -29,13 +29,14 @@ double clear(double difference, double own, double margin, double share) {
 
 }  // namespace
 
-TurnedRivals::TurnedRivals(const ObjectModel& object, const ContourModel& model,
-                           const PoseRefiner& refiner, const RectifiedStereoCamera& camera)
-    : symmetry_(object.symmetry),
-      baseline_(camera.baseline),
+TurnedRivals::TurnedRivals(const Symmetry& symmetry, const ContourModel& model,
+                           const PoseRefiner& refiner, const ShadedView& shaded_view,
+                           double baseline)
+    : symmetry_(symmetry),
+      baseline_(baseline),
       model_(&model),
       refiner_(&refiner),
-      shaded_view_(object.mesh, camera) {}
+      shaded_view_(&shaded_view) {}
 
 void TurnedRivals::forget() {
   rival_.reset();
@@ -96,7 +97,7 @@ std::optional<Pose> TurnedRivals::look(const Pose& pose, const std::vector<Pose>
     tbb::parallel_for(std::size_t{0}, compared.size(), [&](std::size_t i) {
       refineExactly(*refiner_, *model_, measurement.fields(), baseline_, {}, appearance,
                     compared[i]);
-      shaded[i] = shaded_view_.logLikelihood(measurement.fields(), compared[i].camera_from_object);
+      shaded[i] = shaded_view_->logLikelihood(measurement.fields(), compared[i].camera_from_object);
     });
     const double own = compared.front().log_likelihood;
     for (std::size_t i = 1; i < compared.size(); ++i) {

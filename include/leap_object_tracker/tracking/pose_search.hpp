@@ -50,6 +50,8 @@ class PoseSearch {
   /// its axes.
   std::vector<Pose> turned(const Pose& camera_from_object) const;
 
+  const ShadedView& shadedView() const { return shaded_view_; }
+
   int orientations() const { return static_cast<int>(orientations_.size()); }
 
  private:

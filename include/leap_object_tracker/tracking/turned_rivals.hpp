@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "leap_object_tracker/geometry/object_model.hpp"
+#include "leap_object_tracker/geometry/symmetry.hpp"
 #include "leap_object_tracker/tracking/contour_measurement.hpp"
 #include "leap_object_tracker/tracking/contour_model.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
@@ -17,8 +17,9 @@ namespace leap_object_tracker {
 /// hypotheses", 1945, with the gain of one look bounded: looks share their errors).
 class TurnedRivals {
  public:
-  TurnedRivals(const ObjectModel& object, const ContourModel& model, const PoseRefiner& refiner,
-               const RectifiedStereoCamera& camera);
+  /// The models must outlive this. @param baseline [m] of the eyes
+  TurnedRivals(const Symmetry& symmetry, const ContourModel& model, const PoseRefiner& refiner,
+               const ShadedView& shaded_view, double baseline);
 
   void forget();
 
@@ -37,7 +38,7 @@ class TurnedRivals {
   double baseline_;
   const ContourModel* model_;
   const PoseRefiner* refiner_;
-  ShadedView shaded_view_;
+  const ShadedView* shaded_view_;
   std::optional<Pose> rival_;  ///< object_from_object of the likeliest turned pose
   double lead_ = 0;            ///< [nats] by which it was better, over all looks
 };

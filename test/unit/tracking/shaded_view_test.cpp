@@ -124,7 +124,8 @@ class Rivals : public Shaded {
     ContourMeasurement measurement(ContourParams(), Eyes::kBoth, camera_);
     const cv::Rect whole(cv::Point(), camera_.size);
     measurement.observe(castFrame(object_.mesh, truth_, camera_), {whole, whole});
-    TurnedRivals rivals(object_, model_, refiner_, camera_);
+    const ShadedView shaded_view(object_.mesh, camera_);
+    TurnedRivals rivals(object_.symmetry, model_, refiner_, shaded_view, camera_.baseline);
     for (needed = 1; needed <= looks; ++needed)
       if (const auto better = rivals.look(own, {other}, measurement, {})) return better;
     return std::nullopt;

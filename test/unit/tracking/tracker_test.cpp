@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "cast_body.hpp"
 #include "drawn_box.hpp"
 
 namespace leap_object_tracker {
@@ -171,6 +172,46 @@ TEST_F(MovingBox, restsInTheFixedFrameWhileTheCameraMoves) {
 TEST(Tracker, refusesACameraWithoutFocalLength) {
   EXPECT_THROW(Tracker(TrackerParams(), box(0.03, 0.03, 0.03), RectifiedStereoCamera()),
                std::invalid_argument);
+}
+
+/// A frame whose body shows its middle only, its outline lost in a haze.
+RectifiedStereoFrame withoutOutline(const RectifiedStereoFrame& frame) {
+  RectifiedStereoFrame hazy;
+  for (const bool left : {true, false}) {
+    const cv::Mat& image = left ? frame.left : frame.right;
+    cv::Mat body, share, mixed;
+    cv::morphologyEx(image > 8, body, cv::MORPH_CLOSE, cv::Mat::ones(9, 9, CV_8UC1));
+    cv::erode(body, body, cv::Mat::ones(13, 13, CV_8UC1));
+    body.convertTo(share, CV_32FC1, 1 / 255.0);
+    cv::GaussianBlur(share, share, cv::Size(), 3);
+    image.convertTo(mixed, CV_32FC1);
+    mixed = mixed.mul(share) + 50 * (1 - share);
+    mixed.convertTo(left ? hazy.left : hazy.right, CV_8UC1);
+  }
+  return hazy;
+}
+
+TEST(TexturedBody, isFollowedThoughItsOutlineIsHidden) {
+  const RectifiedStereoCamera camera = roundCamera();
+  const ObjectModel body = box(0.05, 0.05, 0.02);
+  Pose truth = poseAt(0.02, 0, 0.15);
+  truth.linear() = rotationFromVector({0.35, 0.3, 0.2});
+  Look look;
+  look.checks = 0.006;
+  look.rays = 3;
+  RectifiedStereoFrame clear = castFrame(body.mesh, truth, camera, look);
+  RectifiedStereoFrame hazy = withoutOutline(clear);
+  Tracker tracker(TrackerParams(), body, camera);
+  tracker.start(truth);
+  for (int frame = 0; frame < 40; ++frame) {
+    RectifiedStereoFrame& seen = frame < 20 ? clear : hazy;
+    seen.stamp = stampFromSeconds(1 + frame * kPeriod);
+    const auto estimate = tracker.track(seen);
+    ASSERT_TRUE(estimate) << frame;
+    EXPECT_LT((estimate->camera_from_object.translation() - truth.translation()).norm(), 0.001)
+        << frame;
+    if (frame >= 20) EXPECT_LT(tracker.report().support, 0.5) << frame;
+  }
 }
 
 }  // namespace
