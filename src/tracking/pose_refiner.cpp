@@ -542,6 +542,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   }
   if (fitted > 0) result.log_likelihood -= kMisfitWeight * all * misfit / fitted;
   const SurfaceEvidence texture = evidenceOf(appearance.texture, fields, pose);
+  result.texture_information = texture.information;
   result.information += texture.information;
   result.log_likelihood += texture.log_likelihood;
   result.bright_inside = judged > 0 ? bright / judged : 0.5;

@@ -55,9 +55,12 @@ constexpr int kYoungPeriod = 2, kOldPeriod = 12;  // [frames]
 constexpr double kTrustedLandmarks = 0.5;  // share of landmarks that make turned poses needless
 constexpr double kTextureSupport = 0.6;    // share of the learned texture, to stand by a pose
 constexpr double kTextureLearningSupport = 0.78;  // of a pose at which texture is learned
-constexpr int kSettled = 4;                       // such frames after a start before it is
-constexpr double kExact = 0.5;                    // [px]
-constexpr double kNothingLeft = 0.15;             // support at which the object is lost at once
+// Of the covariance of the contour alone: what is left after so many frames of learning, of errors
+// that are much alike from frame to frame.
+constexpr double kLearnedError = 0.4;
+constexpr int kSettled = 4;              // such frames after a start before it is
+constexpr double kExact = 0.5;           // [px]
+constexpr double kNothingLeft = 0.15;    // support at which the object is lost at once
 constexpr int kPatience = 3;             // frames below it before the object counts as lost
 constexpr double kFoundSupport = 0.68;   // share of the contour that a found pose must have
 constexpr double kSureStart = 0.80;      // support that needs no other frame to prove itself
@@ -324,6 +327,7 @@ class Tracker::Impl {
     frames_to_opinion_ = opinion_period_ = kFirstOpinion;
     weak_frames_ = 0;
     leverage_.setZero();
+    learned_error_.setZero();
     fresh_ = true;
     proven_ = sure;
   }
@@ -394,7 +398,7 @@ class Tracker::Impl {
   }
 
   Matrix6d covarianceToReport() const {
-    Matrix6d covariance = belief_.poseCovariance() + common(belief_.pose);
+    Matrix6d covariance = belief_.poseCovariance() + common(belief_.pose) + learned_error_;
     if (!object_.symmetry.hasFreeAxis()) return covariance;
     const Eigen::Vector3d axis = belief_.pose.linear() * object_.symmetry.free_axis;
     const double spin = axis.dot(covariance.bottomRightCorner<3, 3>() * axis);
@@ -432,6 +436,17 @@ class Tracker::Impl {
     Twist deviation;
     deviation << error, error, along, turn, turn, turn;
     return deviation.cwiseAbs2().asDiagonal();
+  }
+
+  /// Covariance of what the contour erred by while the texture was learned: the texture keeps it.
+  Matrix6d errorOfLearning(const RefinedPose& refined) const {
+    if (refined.texture_information.isZero()) return Matrix6d::Zero();
+    Twist most;
+    most << Eigen::Vector3d::Constant(0.005), Eigen::Vector3d::Constant(0.1);
+    Matrix6d contour = refined.information - refined.texture_information;
+    contour.diagonal() += most.cwiseAbs2().cwiseInverse();
+    if (object_.symmetry.hasFreeAxis()) contour += 1e6 * freeSpin(refined.camera_from_object);
+    return kLearnedError * contour.inverse();
   }
 
   /// Covariance of a pose that fits the image only nearly: a few pixels in every direction.
@@ -682,6 +697,7 @@ class Tracker::Impl {
     }
     if (supported) {
       leverage_ = refined.leverage;
+      learned_error_ = errorOfLearning(refined);
       belief_.update(refined.camera_from_object, refined.information);
       usual_residual_ = usual_residual_ > 0
                             ? usual_residual_ + 0.1 * (refined.residual - usual_residual_)
@@ -724,8 +740,9 @@ class Tracker::Impl {
   Appearance appearance_;
   std::vector<std::uint32_t> order_;  ///< of the particles, the best ones first
   int weak_frames_ = 0;
-  double usual_residual_ = 0;             ///< [px]
-  Matrix6d leverage_ = Matrix6d::Zero();  ///< of the last supported pose
+  double usual_residual_ = 0;                  ///< [px]
+  Matrix6d leverage_ = Matrix6d::Zero();       ///< of the last supported pose
+  Matrix6d learned_error_ = Matrix6d::Zero();  ///< likewise
   int frames_to_opinion_ = kFirstOpinion, opinion_period_ = kFirstOpinion;
   int frames_lost_ = 0;
   int learned_frames_ = 0;  ///< in which texture could be learned
