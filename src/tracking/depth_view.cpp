@@ -10,6 +10,22 @@ constexpr float kNearest = 0.01F;  // [m] of a vertex that is drawn
 
 }  // namespace
 
+void placeBody(const std::vector<Eigen::Vector3f>& vertices,
+               const std::vector<std::array<std::uint32_t, 3>>& triangles,
+               const Pose& camera_from_object, PlacedBody& body) {
+  const Eigen::Matrix3f rotation = camera_from_object.linear().cast<float>();
+  const Eigen::Vector3f origin = camera_from_object.translation().cast<float>();
+  body.points.clear();
+  body.points.reserve(vertices.size());
+  for (const Eigen::Vector3f& vertex : vertices)
+    body.points.emplace_back(rotation * vertex + origin);
+  body.normals.clear();
+  body.normals.reserve(triangles.size());
+  for (const auto& [a, b, c] : triangles)
+    body.normals.emplace_back(
+        (body.points[b] - body.points[a]).cross(body.points[c] - body.points[a]).normalized());
+}
+
 void drawDepths(const std::vector<Eigen::Vector3f>& points,
                 const std::vector<std::array<std::uint32_t, 3>>& triangles,
                 const RectifiedStereoCamera& camera, float eye_x, const cv::Rect& limits,
@@ -72,6 +88,17 @@ void drawDepths(const std::vector<Eigen::Vector3f>& points,
       }
     }
   }
+}
+
+Eigen::Vector3f placeSeen(const DepthView& seen, const RectifiedStereoCamera& camera, float eye_x,
+                          int u, int v) {
+  const float depth = 1 / seen.nearness.at<float>(v, u);
+  const auto focal = static_cast<float>(camera.focal_length);
+  return {
+      eye_x + (static_cast<float>(u + seen.box.x) - static_cast<float>(camera.center_u)) * depth /
+                  focal,
+      (static_cast<float>(v + seen.box.y) - static_cast<float>(camera.center_v)) * depth / focal,
+      depth};
 }
 
 }  // namespace leap_object_tracker

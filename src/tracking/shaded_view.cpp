@@ -30,33 +30,26 @@ ShadedView::ShadedView(const Mesh& mesh, const RectifiedStereoCamera& camera)
 
 double ShadedView::logLikelihood(const std::array<EdgeField, 2>& fields,
                                  const Pose& camera_from_object) const {
-  const Eigen::Matrix3f rotation = camera_from_object.linear().cast<float>();
-  const Eigen::Vector3f origin = camera_from_object.translation().cast<float>();
-  std::vector<Eigen::Vector3f> points;
-  points.reserve(vertices_.size());
-  for (const Eigen::Vector3f& vertex : vertices_) points.emplace_back(rotation * vertex + origin);
-  std::vector<Eigen::Vector3f> normals;
-  normals.reserve(triangles_.size());
-  for (const auto& [a, b, c] : triangles_)
-    normals.emplace_back((points[b] - points[a]).cross(points[c] - points[a]).normalized());
+  PlacedBody body;
+  placeBody(vertices_, triangles_, camera_from_object, body);
   const bool coarse =
       camera_.focal_length * radius_ > kLargeBody * camera_from_object.translation().z();
-  std::array<float, 3> lamps{};
-  std::array<DepthView, 3> lit;
+  std::array<float, kLamps> lamps{};
+  std::array<DepthView, kLamps> lit;
   const cv::Size& size = camera_.size;
   const cv::Rect everywhere(-size.width, -size.height, 3 * size.width, 3 * size.height);
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    lamps[i] =
-        static_cast<float>(0.5 * camera_.baseline + (static_cast<double>(i) - 1) * kLampSpacing);
-    drawDepths(points, triangles_, camera_, lamps[i], everywhere, coarse ? 0.5F : 1.0F, lit[i]);
+    lamps[i] = lampPlace(static_cast<int>(i), camera_.baseline);
+    drawDepths(body.points, triangles_, camera_, lamps[i], everywhere, coarse ? 0.5F : 1.0F,
+               lit[i]);
   }
   Sums all;
   for (std::size_t eye = 0; eye < 2; ++eye) {
     if (!fields[eye].seen()) continue;
     const auto eye_x = static_cast<float>(eye == 0 ? 0 : camera_.baseline);
     DepthView seen;
-    drawDepths(points, triangles_, camera_, eye_x, fields[eye].region(), 1, seen);
-    const Sums sums = compare(fields[eye], normals, eye_x, seen, lamps, lit);
+    drawDepths(body.points, triangles_, camera_, eye_x, fields[eye].region(), 1, seen);
+    const Sums sums = compare(fields[eye], body.normals, eye_x, seen, lamps, lit);
     all.residual += sums.residual;
     all.brightness += sums.brightness;
     all.pixels += sums.pixels;
@@ -78,35 +71,28 @@ ShadedView::Sums ShadedView::compare(const EdgeField& field,
   const cv::Mat grey = field.image()(seen.box - field.region().tl());
   const auto focal = static_cast<float>(camera_.focal_length);
   const auto center_u = static_cast<float>(camera_.center_u);
-  const auto center_v = static_cast<float>(camera_.center_v);
 
   cv::Mat shading(seen.box.size(), CV_32FC1, cv::Scalar(0));
   for (int v = 0; v < seen.box.height; ++v)
     for (int u = 0; u < seen.box.width; ++u) {
-      const float near = seen.nearness.at<float>(v, u);
-      if (near <= 0) continue;
-      const float depth = 1 / near;
-      const Eigen::Vector3f at(
-          eye_x + (static_cast<float>(u + seen.box.x) - center_u) * depth / focal,
-          (static_cast<float>(v + seen.box.y) - center_v) * depth / focal, depth);
+      if (seen.nearness.at<float>(v, u) <= 0) continue;
+      const Eigen::Vector3f at = placeSeen(seen, camera_, eye_x, u, v);
       const Eigen::Vector3f& normal =
           normals[static_cast<std::size_t>(seen.triangle.at<int>(v, u))];
       float shade = 0;
       for (std::size_t i = 0; i < lamps.size(); ++i) {
-        const Eigen::Vector3f to_lamp = Eigen::Vector3f(lamps[i], 0, 0) - at;
-        const float cosine = normal.dot(to_lamp);
-        if (cosine <= 0) continue;
+        const float light = lampLight(lamps[i], at, normal);
+        if (light <= 0) continue;
         // Something else of the body may throw its shadow here.
-        const float lamp_u = center_u + focal * (at.x() - lamps[i]) / depth;
+        const float lamp_u = center_u + focal * (at.x() - lamps[i]) / at.z();
         const auto lamp_v = static_cast<float>(v + seen.box.y);
         const cv::Point cell =
             cv::Point(cvRound(lit[i].scale * lamp_u), cvRound(lit[i].scale * lamp_v)) -
             lit[i].box.tl();
         if (cell.x >= 0 && cell.y >= 0 && cell.x < lit[i].box.width && cell.y < lit[i].box.height &&
-            lit[i].nearness.at<float>(cell) * depth > 1 + kShadowSlack / lit[i].scale)
+            lit[i].nearness.at<float>(cell) * at.z() > 1 + kShadowSlack / lit[i].scale)
           continue;
-        const float square = to_lamp.squaredNorm();
-        shade += cosine / (square * std::sqrt(square));
+        shade += light;
       }
       shading.at<float>(v, u) = shade;
     }

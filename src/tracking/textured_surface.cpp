@@ -166,15 +166,11 @@ void limit(double shift, const Errors& errors, SurfaceEvidence& evidence) {
   evidence.log_likelihood *= most / shift;
 }
 
-/// Brightness of a matt surface under the three lamps.
+/// Brightness of a matt surface under all lamps.
 float shadingAt(const Eigen::Vector3f& at, const Eigen::Vector3f& normal, double baseline) {
   float shade = 0;
-  for (int i = -1; i <= 1; ++i) {
-    const Eigen::Vector3f to_lamp =
-        Eigen::Vector3f(static_cast<float>(0.5 * baseline + i * kLampSpacing), 0, 0) - at;
-    const float square = to_lamp.squaredNorm();
-    shade += std::max(0.0F, normal.dot(to_lamp)) / (square * std::sqrt(square));
-  }
+  for (int lamp = 0; lamp < kLamps; ++lamp)
+    shade += lampLight(lampPlace(lamp, baseline), at, normal);
   return shade;
 }
 
@@ -213,7 +209,7 @@ struct TexturedSurface::Learned : SurfacePlace {
 
 struct TexturedSurface::Views {
   std::array<DepthView, 2> eyes;
-  std::vector<Eigen::Vector3f> normals;
+  PlacedBody body;
 };
 
 TexturedSurface::TexturedSurface(const ObjectModel& object, const RectifiedStereoCamera& camera)
@@ -244,17 +240,13 @@ void TexturedSurface::look(const std::array<EdgeField, 2>& fields, const Pose& c
   if (!said_.value_or(true) || !fields[0].seen() || !fields[1].seen() || --idle_ >= 0) return;
   const Eigen::Matrix3f rotation = camera_from_object.linear().cast<float>();
   const Eigen::Vector3f origin = camera_from_object.translation().cast<float>();
-  thread_local std::vector<Eigen::Vector3f> points;
-  points.clear();
-  for (const Eigen::Vector3f& vertex : vertices_) points.emplace_back(rotation * vertex + origin);
-  std::vector<Eigen::Vector3f>& normals = views_->normals;
-  normals.clear();
-  for (const auto& [a, b, c] : triangles_)
-    normals.emplace_back((points[b] - points[a]).cross(points[c] - points[a]).normalized());
+  placeBody(vertices_, triangles_, camera_from_object, views_->body);
+  const std::vector<Eigen::Vector3f>& normals = views_->body.normals;
   std::array<DepthView, 2>& seen = views_->eyes;
   for (std::size_t eye = 0; eye < 2; ++eye) {
-    drawDepths(points, triangles_, camera_, eye == 0 ? 0 : static_cast<float>(camera_.baseline),
-               fields[eye].region(), 1, seen[eye]);
+    drawDepths(views_->body.points, triangles_, camera_,
+               eye == 0 ? 0 : static_cast<float>(camera_.baseline), fields[eye].region(), 1,
+               seen[eye]);
     if (seen[eye].box.area() <= 0) return;
   }
   findTexture(fields);
@@ -265,7 +257,7 @@ void TexturedSurface::look(const std::array<EdgeField, 2>& fields, const Pose& c
     return;
   }
   for (const Spot& spot : spots_) {
-    const Eigen::Vector3f at = placeOf(spot.u, spot.v);
+    const Eigen::Vector3f at = placeSeen(seen[0], camera_, 0, spot.u, spot.v);
     new_places_.push_back(
         {rotation.transpose() * (at - origin),
          rotation.transpose() *
@@ -292,17 +284,6 @@ void TexturedSurface::look(const std::array<EdgeField, 2>& fields, const Pose& c
   in_sight_.resize(kMostInSight);
 }
 
-/// What a pixel of the left eye's view shows, in the camera's frame.
-Eigen::Vector3f TexturedSurface::placeOf(int u, int v) const {
-  const DepthView& seen = views_->eyes[0];
-  const float depth = 1 / seen.nearness.at<float>(v, u);
-  const auto focal = static_cast<float>(camera_.focal_length);
-  return {
-      (static_cast<float>(u + seen.box.x) - static_cast<float>(camera_.center_u)) * depth / focal,
-      (static_cast<float>(v + seen.box.y) - static_cast<float>(camera_.center_v)) * depth / focal,
-      depth};
-}
-
 /// Whether the right eye too sees what a pixel of the left eye's view shows.
 bool TexturedSurface::bothSee(int u, int v) const {
   const auto& [left, right] = views_->eyes;
@@ -310,7 +291,7 @@ bool TexturedSurface::bothSee(int u, int v) const {
   const float disparity = static_cast<float>(camera_.focal_length * camera_.baseline) * near;
   const int other_u = cvRound(static_cast<float>(u + left.box.x) - disparity) - right.box.x;
   const int other_v = v + left.box.y - right.box.y;
-  return smoothAround(right, views_->normals, other_u, other_v) &&
+  return smoothAround(right, views_->body.normals, other_u, other_v) &&
          std::abs(right.nearness.at<float>(other_v, other_u) - near) < kHiddenStep * near;
 }
 
@@ -337,8 +318,9 @@ void TexturedSurface::findTexture(const std::array<EdgeField, 2>& fields) {
     for (int u = first_u; u < last_u; ++u) {
       if (nearness[u] <= 0) continue;
       // Some pixels tell the share.
-      const bool counts = u % kCountEvery == 0 && v % kCountEvery == 0 &&
-                          smoothAround(seen, views_->normals, u, v, kSmoothTurn, kFarFromEdges);
+      const bool counts =
+          u % kCountEvery == 0 && v % kCountEvery == 0 &&
+          smoothAround(seen, views_->body.normals, u, v, kSmoothTurn, kFarFromEdges);
       if (counts) smooth_ += 1;
       const float grey = static_cast<float>(here[u]) / 16;
       const float slope = std::hypot(static_cast<float>(here[u + 1] - here[u - 1]),
@@ -347,7 +329,7 @@ void TexturedSurface::findTexture(const std::array<EdgeField, 2>& fields) {
       if (slope < kSlopeOnFlat * grey || grey > kSaturated) continue;
       const float noise = fields[0].slopeNoise(grey);
       if (slope < kTextureNoise * noise ||
-          !smoothAround(seen, views_->normals, u, v,
+          !smoothAround(seen, views_->body.normals, u, v,
                         slope < kSlopeOnCurved * grey ? kFlatTurn : kSmoothTurn) ||
           !bothSee(u, v))
         continue;
@@ -380,8 +362,8 @@ void TexturedSurface::findTexture(const std::array<EdgeField, 2>& fields) {
 }
 
 /// What one eye sees of learned places.
-template <class Indices>
-void TexturedSurface::sample(const EdgeField& field, int eye, const Indices& indices,
+void TexturedSurface::sample(const EdgeField& field, int eye,
+                             const std::vector<std::size_t>& indices,
                              const Pose& camera_from_object,
                              std::vector<SurfaceSample>& samples) const {
   samples.clear();
@@ -438,10 +420,11 @@ void TexturedSurface::learn(const std::array<EdgeField, 2>& fields,
   thread_local std::vector<std::size_t> places;
   places.assign(in_sight_.begin(), in_sight_.end());
   for (std::size_t i = 0; i < learned_.size(); ++i) {
+    if (learned_[i].seen >= kFirstLooks) continue;
     const Eigen::Vector3f ray =
         (camera_from_object * learned_[i].point.cast<double>()).normalized().cast<float>();
     const Eigen::Vector3f normal = camera_from_object.linear().cast<float>() * learned_[i].normal;
-    if (learned_[i].seen < kFirstLooks && normal.dot(ray) < -kLeastFacing) places.push_back(i);
+    if (normal.dot(ray) < -kLeastFacing) places.push_back(i);
   }
   thread_local std::vector<SurfaceSample> samples, known;
   for (int eye = 0; eye < 2; ++eye) {
@@ -533,15 +516,24 @@ SurfaceEvidence TexturedSurface::compareEyes(const std::array<EdgeField, 2>& fie
   return evidence;
 }
 
+/// What one eye sees of the learned places in sight against what is expected; none if too few.
+void TexturedSurface::compareInSight(const std::array<EdgeField, 2>& fields, int eye,
+                                     const Pose& camera_from_object,
+                                     std::vector<SurfaceSample>& samples) const {
+  sample(fields[static_cast<std::size_t>(eye)], eye, in_sight_, camera_from_object, samples);
+  if (samples.size() < kFewest)
+    samples.clear();
+  else
+    fitGain(samples);
+}
+
 SurfaceEvidence TexturedSurface::compareWithKnown(const std::array<EdgeField, 2>& fields,
                                                   const Pose& camera_from_object) const {
   SurfaceEvidence evidence;
   thread_local std::vector<SurfaceSample> samples;
   double shift = 0;
   for (int eye = 0; eye < 2; ++eye) {
-    sample(fields[static_cast<std::size_t>(eye)], eye, in_sight_, camera_from_object, samples);
-    if (samples.size() < kFewest) continue;
-    fitGain(samples);
+    compareInSight(fields, eye, camera_from_object, samples);
     shift += add(samples, evidence);
   }
   limit(shift, kAgainstKnown, evidence);
@@ -554,9 +546,7 @@ double TexturedSurface::support(const std::array<EdgeField, 2>& fields,
   thread_local std::vector<SurfaceSample> samples;
   double alike = 0;
   for (int eye = 0; eye < 2; ++eye) {
-    sample(fields[static_cast<std::size_t>(eye)], eye, in_sight_, camera_from_object, samples);
-    if (samples.size() < kFewest) continue;
-    fitGain(samples);
+    compareInSight(fields, eye, camera_from_object, samples);
     for (const SurfaceSample& s : samples)
       if (s.residual * s.residual < kOutlier * kOutlier * s.variance) alike += 1;
   }

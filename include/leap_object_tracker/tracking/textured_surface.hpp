@@ -71,12 +71,12 @@ class TexturedSurface {
   struct Learned;
   struct Views;
   bool knows() const;
-  Eigen::Vector3f placeOf(int u, int v) const;
   bool bothSee(int u, int v) const;
   void findTexture(const std::array<EdgeField, 2>& fields);
-  template <class Indices>
-  void sample(const EdgeField& field, int eye, const Indices& indices,
+  void sample(const EdgeField& field, int eye, const std::vector<std::size_t>& indices,
               const Pose& camera_from_object, std::vector<SurfaceSample>& samples) const;
+  void compareInSight(const std::array<EdgeField, 2>& fields, int eye,
+                      const Pose& camera_from_object, std::vector<SurfaceSample>& samples) const;
   static void update(Learned& place, float brightness, float noise);
   SurfaceEvidence compareEyes(const std::array<EdgeField, 2>& fields,
                               const Pose& camera_from_object) const;
