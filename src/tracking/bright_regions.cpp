@@ -109,6 +109,18 @@ const BrightRegion::Extents& BrightRegion::sines() {
   return values;
 }
 
+std::optional<double> BrightRegion::apart(const BrightRegion& other, int direction) const {
+  const int opposite = (direction + kDirections / 2) % kDirections;
+  double sum = 0, sides = 0;
+  for (const int i : {direction, opposite}) {
+    if (known[i] < 0.5F || other.known[i] < 0.5F) continue;
+    sum += static_cast<double>(extents[i] - other.extents[i]) * (i == direction ? 1 : -1);
+    sides += 1;
+  }
+  if (sides == 0) return std::nullopt;
+  return sum / sides;
+}
+
 std::vector<BrightRegion> findBrightRegions(const cv::Mat& image) {
   std::vector<BrightRegion> regions;
   if (image.empty()) return regions;

@@ -15,7 +15,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 void reachOf(const float* arrays, std::size_t stride, std::size_t count,
              const Eigen::Vector3f& origin, const Eigen::Matrix3f& rotation, float nearest,
-             const std::array<float, 32>& directions, ContourReach& reach) {
+             const Eigen::AlignedBox2f& window, const std::array<float, 32>& directions,
+             ContourReach& reach) {
   constexpr std::size_t kBlock = 16;
   const hn::CappedTag<float, kBlock> df;
   using Float = hn::Vec<decltype(df)>;
@@ -23,7 +24,7 @@ void reachOf(const float* arrays, std::size_t stride, std::size_t count,
   alignas(64) std::array<float, ContourReach::kDirections> largest;
   for (std::size_t i = 0; i < largest.size(); i += hn::Lanes(df))
     hn::Store(hn::Set(df, -1e9F), df, largest.data() + i);
-  Float length = hn::Zero(df), least = hn::Set(df, 1e9F);
+  Float length = hn::Zero(df);
   for (std::size_t block = 0; block < count; block += kBlock) {
     for (std::size_t k = 0; k < kBlock; k += hn::Lanes(df)) {
       const auto turned = [&](std::size_t column, Eigen::Index row) HWY_ATTR {
@@ -33,8 +34,7 @@ void reachOf(const float* arrays, std::size_t stride, std::size_t count,
             hn::MulAdd(hn::Set(df, rotation(row, 1)), hn::LoadU(df, values + stride),
                        hn::Mul(hn::Set(df, rotation(row, 2)), hn::LoadU(df, values + 2 * stride))));
       };
-      const Float z = hn::Add(turned(0, 2), hn::Set(df, origin.z()));
-      least = hn::Min(least, z);
+      const Float z = hn::Max(hn::Add(turned(0, 2), hn::Set(df, origin.z())), hn::Set(df, nearest));
       const Float inverse = hn::Div(hn::Set(df, 1.0F), z);
       const Float u = hn::Mul(hn::Add(turned(0, 0), hn::Set(df, origin.x())), inverse);
       const Float v = hn::Mul(hn::Add(turned(0, 1), hn::Set(df, origin.y())), inverse);
@@ -43,7 +43,12 @@ void reachOf(const float* arrays, std::size_t stride, std::size_t count,
       const Float along = turned(3, 2);
       const Float du = hn::NegMulAdd(u, along, turned(3, 0));
       const Float dv = hn::NegMulAdd(v, along, turned(3, 1));
-      length = hn::MulAdd(hn::Sqrt(hn::MulAdd(du, du, hn::Mul(dv, dv))), inverse, length);
+      const auto seen = hn::And(hn::And(hn::Ge(u, hn::Set(df, window.min().x())),
+                                        hn::Le(u, hn::Set(df, window.max().x()))),
+                                hn::And(hn::Ge(v, hn::Set(df, window.min().y())),
+                                        hn::Le(v, hn::Set(df, window.max().y()))));
+      length = hn::MulAdd(hn::Sqrt(hn::MulAdd(du, du, hn::Mul(dv, dv))),
+                          hn::IfThenElseZero(seen, inverse), length);
     }
     for (std::size_t i = 0; i < largest.size(); i += hn::Lanes(df)) {
       const Float c = hn::LoadU(df, directions.data() + i);
@@ -57,7 +62,6 @@ void reachOf(const float* arrays, std::size_t stride, std::size_t count,
   reach.extents =
       Eigen::Map<const Eigen::Array<float, ContourReach::kDirections, 1>>(largest.data());
   reach.length = hn::GetLane(hn::SumOfLanes(df, length));
-  reach.in_front = hn::GetLane(hn::MinOfLanes(df, least)) >= nearest;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -73,7 +77,7 @@ HWY_EXPORT(reachOf);
 
 ContourReach reachOfContour(const float* arrays, std::size_t stride, std::size_t count,
                             const Eigen::Vector3f& origin, const Eigen::Matrix3f& rotation,
-                            float nearest) {
+                            float nearest, const Eigen::AlignedBox2f& window) {
   static const std::array<float, 32> directions = [] {
     std::array<float, 32> values{};
     for (std::size_t i = 0; i < 16; ++i) {
@@ -85,7 +89,7 @@ ContourReach reachOfContour(const float* arrays, std::size_t stride, std::size_t
   }();
   ContourReach reach;
   HWY_DYNAMIC_DISPATCH(reachOf)
-  (arrays, stride, count, origin, rotation, nearest, directions, reach);
+  (arrays, stride, count, origin, rotation, nearest, window, directions, reach);
   return reach;
 }
 

@@ -19,13 +19,14 @@ constexpr double kWorstArea = 1.4;  // log of the ratio to the object's largest 
 constexpr double kDoubtOfOneEye = 0.5, kDoubtOfClosing = 0.1;
 constexpr double kTrustOfContrast = 0.3;   // a doubling of the thresholds that a region stands
 constexpr std::size_t kTurned = 24;        // of the turned poses that are refined
-constexpr float kNearest = 0.02F;          // [m] of any part of a pose
-constexpr int kHullPoints = 64;            // of the contour, for how far it reaches
+constexpr float kNearest = 0.01F;          // [m] of any part of a pose
+constexpr int kHullDirections = 100;       // in which the outermost vertices of the body are taken
 constexpr float kFewestDirections = 6;     // in which a region's reach must be known
+constexpr double kLeastInside = 0.6;       // of the area of a body that the border cuts
 constexpr float kLeastGrowth = 0.7F;       // of the projection, to fit a region
 constexpr float kHullSpread = 1.5F;        // [px] of a region's reach
 constexpr float kWorstHull = 3;            // [nats] of one direction
-constexpr float kIndependentHull = 0.5F;   // share of directions that speak independently
+constexpr float kIndependentHull = 0.25F;  // share of directions that speak independently
 constexpr int kCoarsePoints = 32;          // of the contour, for the first look
 constexpr std::size_t kLikelyPlaces = 3;   // first by how well their region fits
 constexpr std::size_t kKeptAtLikely = 30;  // hypotheses of such a place that move on
@@ -61,19 +62,23 @@ std::vector<Eigen::Matrix3d> evenRotations(int count) {
   return rotations;
 }
 
+/// Direction i of `count` that are spread evenly (Fibonacci lattice).
+Eigen::Vector3d evenDirection(int i, int count) {
+  const double z = 1 - (2 * i + 1.0) / count, ring = std::sqrt(1 - z * z);
+  const double angle = i * M_PI * (3 - std::sqrt(5.0));
+  return {ring * std::cos(angle), ring * std::sin(angle), z};
+}
+
 /// One of each class of orientations that look the same.
 std::vector<Eigen::Matrix3d> distinctRotations(const Symmetry& symmetry, int count) {
   std::vector<Eigen::Matrix3d> kept;
   if (symmetry.hasFreeAxis()) {
     // Only the direction of the axis matters: as many as there are 15 deg caps on a sphere.
     const int directions = 240;
-    for (int i = 0; i < directions; ++i) {
-      const double z = 1 - (2 * i + 1.0) / directions, ring = std::sqrt(1 - z * z);
-      const double angle = i * M_PI * (3 - std::sqrt(5.0));
-      const Eigen::Vector3d axis(ring * std::cos(angle), ring * std::sin(angle), z);
+    for (int i = 0; i < directions; ++i)
       kept.push_back(
-          Eigen::Quaterniond::FromTwoVectors(symmetry.free_axis, axis).toRotationMatrix());
-    }
+          Eigen::Quaterniond::FromTwoVectors(symmetry.free_axis, evenDirection(i, directions))
+              .toRotationMatrix());
     return kept;
   }
   for (const auto& rotation : evenRotations(count)) {
@@ -110,6 +115,35 @@ std::vector<Eigen::Matrix3d> turnsToTry(const Symmetry& symmetry) {
     }
   }
   return turns;
+}
+
+/// The outermost vertices of a mesh by direction, as the arrays of a ContourView: as many as fill
+/// whole blocks of 16.
+std::vector<float> outermostVertices(const Mesh& mesh) {
+  std::vector<std::size_t> chosen;
+  for (int i = 0; i < kHullDirections; ++i) {
+    const Eigen::Vector3d direction = evenDirection(i, kHullDirections);
+    std::size_t farthest = 0;
+    for (std::size_t v = 1; v < mesh.vertices.size(); ++v)
+      if (direction.dot(mesh.vertices[v] - mesh.vertices[farthest]) > 0) farthest = v;
+    chosen.push_back(farthest);
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  while (chosen.size() % 16 != 0) chosen.push_back(chosen.back());
+  std::vector<float> arrays(6 * chosen.size(), 0);
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      arrays[static_cast<std::size_t>(axis) * chosen.size() + i] =
+          static_cast<float>(mesh.vertices[chosen[i]][axis]);
+  return arrays;
+}
+
+Eigen::AlignedBox2f windowOf(const RectifiedStereoCamera& camera) {
+  const Eigen::Vector2d center(camera.center_u, camera.center_v);
+  const Eigen::Vector2d size(camera.size.width - 1, camera.size.height - 1);
+  return {(-center / camera.focal_length).cast<float>(),
+          ((size - center) / camera.focal_length).cast<float>()};
 }
 
 /// About what a body may be turned and still look nearly the same: the middle of the box around it
@@ -159,51 +193,84 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       shaded_view_(object.mesh, camera),
       shadow_(shadowAreaOf(object.mesh)),
       pivots_(pivotsOf(object.mesh)),
+      hull_(outermostVertices(object.mesh)),
+      window_(windowOf(camera)),
       symmetry_(object.symmetry),
       turns_(turnsToTry(object.symmetry)),
       orientations_(distinctRotations(object.symmetry, kOrientations)) {}
 
+std::pair<Eigen::Vector3f, Eigen::Matrix3f> PoseSearch::seenFrom(const ParticlePose& pose,
+                                                                 std::size_t eye) const {
+  using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
+  return {{pose.translation[0] - (eye == 0 ? 0.0F : static_cast<float>(camera_.baseline)),
+           pose.translation[1], pose.translation[2]},
+          Eigen::Map<const RowMajor>(pose.rotation.data())};
+}
+
 std::vector<PoseSearch::Place> PoseSearch::findPlaces(const RectifiedStereoFrame& frame) const {
   std::vector<Place> places;
   const double focal = camera_.focal_length;
-  const bool left_used = params_.eyes != Eyes::kRight && !frame.left.empty();
   std::array<std::vector<BrightRegion>, 2> regions;
   tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
-    if (eye == 0 ? left_used : params_.eyes != Eyes::kLeft)
+    if (params_.eyes != (eye == 0 ? Eyes::kRight : Eyes::kLeft))
       regions[eye] = findBrightRegions(eye == 0 ? frame.left : frame.right);
   });
-  const auto add = [&](const BrightRegion& region, double depth, double doubt, double eye_x) {
+  // A shadow looks larger beside the optical axis by the inverse of this.
+  const auto narrowing = [&](const BrightRegion& region) {
+    const Eigen::Vector2d beside(region.middleU() - camera_.center_u,
+                                 region.middleV() - camera_.center_v);
+    return focal / std::hypot(focal, beside.norm());
+  };
+  const auto add = [&](std::size_t eye, const BrightRegion& region, const BrightRegion* other,
+                       double depth, double doubt) {
     if (depth < params_.volume.nearest || depth > params_.volume.farthest) return;
-    const double area = region.area * depth * depth / (focal * focal);
-    const double misfit = std::log(std::max({1.0, area / shadow_.largest, shadow_.least / area}));
+    const double area = region.area * depth * depth / (focal * focal) * narrowing(region);
+    const double least = shadow_.least * (region.isCut() ? kLeastInside : 1);
+    const double misfit = std::log(std::max({1.0, area / shadow_.largest, least / area}));
     if (misfit > kWorstArea) return;
     doubt += misfit + kDoubtOfClosing * region.closing -
              kTrustOfContrast * std::min(3.0, std::log2(region.brightest / region.faintest));
-    places.push_back({{eye_x + (region.middleU() - camera_.center_u) * depth / focal,
-                       (region.middleV() - camera_.center_v) * depth / focal, depth},
-                      doubt,
-                      region,
-                      eye_x});
+    const double eye_x = eye == 0 ? 0 : camera_.baseline;
+    Place place{{eye_x + (region.middleU() - camera_.center_u) * depth / focal,
+                 (region.middleV() - camera_.center_v) * depth / focal, depth},
+                doubt,
+                {}};
+    place.regions[eye] = region;
+    if (other != nullptr) place.regions[1 - eye] = *other;
+    places.push_back(place);
+  };
+  const auto addOneEyed = [&](std::size_t eye, const BrightRegion& region) {
+    add(eye, region, nullptr, focal * std::sqrt(shadow_.mean / (region.area * narrowing(region))),
+        kDoubtOfOneEye);
   };
   const double half_radius = 0.35 * model_->radius();
+  std::vector<char> seen_left(regions[1].size(), 0);
   for (const BrightRegion& region : regions[0]) {
-    for (const BrightRegion& other : regions[1]) {
+    for (std::size_t i = 0; i < regions[1].size(); ++i) {
+      const BrightRegion& other = regions[1][i];
       if (other.closing != region.closing || other.faintest > region.brightest ||
           other.brightest < region.faintest)
         continue;
-      const double lower = std::abs(other.middleV() - region.middleV());
+      const bool cut = region.isCut() || other.isCut();
+      const std::optional<double> lower = region.apart(other, BrightRegion::kBelow),
+                                  disparity = region.apart(other, BrightRegion::kRight);
       const double larger = std::abs(std::log(other.area / region.area));
-      if (lower > 4 + 0.25 * (region.high_v - region.low_v) || larger > 0.7) continue;
-      const double disparity = region.middleU() - other.middleU();
-      if (disparity < 2) continue;
+      if (!disparity || *disparity < 2 || larger > (cut ? 1 : 0.7)) continue;
+      const double apart = std::abs(lower.value_or(0));
+      if (apart > 4 + 0.25 * (region.high_v - region.low_v)) continue;
+      if (!region.isCut()) seen_left[i] = 1;
       // The region is the near side of the object.
-      add(region, focal * camera_.baseline / disparity + half_radius, larger + lower / 20, 0);
+      const double depth = focal * camera_.baseline / *disparity + half_radius;
+      const double doubt = (cut ? 0 : larger) + apart / 20;
+      if (region.isCut() && !other.isCut())
+        add(1, other, &region, depth, doubt);
+      else
+        add(0, region, &other, depth, doubt);
     }
-    add(region, focal * std::sqrt(shadow_.mean / region.area), kDoubtOfOneEye, 0);
+    addOneEyed(0, region);
   }
-  if (!left_used)
-    for (const BrightRegion& region : regions[1])
-      add(region, focal * std::sqrt(shadow_.mean / region.area), kDoubtOfOneEye, camera_.baseline);
+  for (std::size_t i = 0; i < regions[1].size(); ++i)
+    if (seen_left[i] == 0) addOneEyed(1, regions[1][i]);
 
   std::sort(places.begin(), places.end(),
             [](const Place& a, const Place& b) { return a.doubt < b.doubt; });
@@ -219,33 +286,33 @@ std::vector<PoseSearch::Place> PoseSearch::findPlaces(const RectifiedStereoFrame
   return chosen;
 }
 
-/// What one eye sees of the first `points` of the contour at a pose, its length in pixels.
-std::optional<ContourReach> PoseSearch::glance(const ParticlePose& pose, double eye_x,
-                                               int points) const {
-  using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
-  const Eigen::Map<const RowMajor> object_rotation(pose.rotation.data());
-  const Eigen::Vector3f origin(pose.translation[0] - static_cast<float>(eye_x), pose.translation[1],
-                               pose.translation[2]);
+/// Length [px] of the first `points` of the contour as one eye sees them.
+float PoseSearch::contourLength(const ParticlePose& pose, std::size_t eye, int points) const {
+  const auto [origin, object_rotation] = seenFrom(pose, eye);
   const ViewChoice choice = model_->choose(-(object_rotation.transpose() * origin));
-  if (choice.view == nullptr || choice.view->arrays.empty()) return std::nullopt;
+  if (choice.view == nullptr || choice.view->arrays.empty()) return 0;
   Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();
   turn(0, 0) = turn(1, 1) = choice.cosine;
   turn(0, 1) = -choice.sine;
   turn(1, 0) = choice.sine;
-  const Eigen::Matrix3f rotation = object_rotation * turn;
-  ContourReach seen =
-      reachOfContour(choice.view->arrays.data(), static_cast<std::size_t>(model_->points()),
-                     static_cast<std::size_t>(points), origin, rotation, kNearest);
-  if (!seen.in_front) return std::nullopt;
-  seen.length *= static_cast<float>(camera_.focal_length);
-  return seen;
+  const ContourReach seen = reachOfContour(
+      choice.view->arrays.data(), static_cast<std::size_t>(model_->points()),
+      static_cast<std::size_t>(points), origin, object_rotation * turn, kNearest, window_);
+  return seen.length * static_cast<float>(camera_.focal_length);
+}
+
+/// How far the body reaches in the image of one eye, over the focal length.
+BrightRegion::Extents PoseSearch::reachInImage(const ParticlePose& pose, std::size_t eye) const {
+  const auto [origin, rotation] = seenFrom(pose, eye);
+  const std::size_t count = hull_.size() / 6;
+  return reachOfContour(hull_.data(), count, count, origin, rotation, kNearest, window_).extents;
 }
 
 /// [nats] by which the reach of a region speaks against a pose.
-float PoseSearch::hullDoubt(const ContourReach& seen, const BrightRegion& region) const {
+float PoseSearch::hullDoubt(const BrightRegion::Extents& reach, const BrightRegion& region) const {
   const auto focal = static_cast<float>(camera_.focal_length);
   const BrightRegion::Extents apart =
-      region.extents - focal * seen.extents -
+      region.extents - focal * reach -
       BrightRegion::cosines() * static_cast<float>(camera_.center_u) -
       BrightRegion::sines() * static_cast<float>(camera_.center_v);
   const auto size = static_cast<float>(std::sqrt(region.area));
@@ -254,41 +321,45 @@ float PoseSearch::hullDoubt(const ContourReach& seen, const BrightRegion& region
          kIndependentHull;
 }
 
-/// Moves a pose until its outline reaches as far as the region in all directions, as well as can be
-/// with a shift in the image and another depth: least squares of the extents.
-std::optional<Pose> PoseSearch::fitToRegion(const Pose& pose, const Place& place) const {
-  const std::optional<ContourReach> seen =
-      glance(toParticlePose(pose), place.eye_x, std::min(kHullPoints, model_->points()));
-  if (!seen) return std::nullopt;
+/// Moves a pose until its outline reaches as far as the regions in all directions, as well as can
+/// be with a shift in the image and another depth: least squares of the extents.
+std::optional<Pose> PoseSearch::fitToRegions(const Pose& pose, const Place& place) const {
   using Extents = BrightRegion::Extents;
   const Extents &c = BrightRegion::cosines(), &s = BrightRegion::sines();
-  const Extents& weight = place.region.known;
-  if (weight.sum() < kFewestDirections) return std::nullopt;
   const auto focal = static_cast<float>(camera_.focal_length);
-  const Extents wanted = (place.region.extents - c * static_cast<float>(camera_.center_u) -
-                          s * static_cast<float>(camera_.center_v)) /
-                         focal;
-  const Eigen::Vector3d origin = pose.translation() - Eigen::Vector3d(place.eye_x, 0, 0);
-  const Eigen::Array2f own = (origin.head<2>() / origin.z()).cast<float>().array();
-  const Extents reach = seen->extents - c * own.x() - s * own.y();
-  // wanted = grown * reach + c x + s y
-  Eigen::Matrix<float, BrightRegion::kDirections, 3> columns;
-  columns << reach, c, s;
-  const Eigen::Matrix<float, 3, BrightRegion::kDirections> weighted =
-      columns.transpose() * weight.matrix().asDiagonal();
-  Eigen::Matrix3f normal = weighted * columns;
-  Eigen::Vector3f right = weighted * wanted.matrix();
+  const Eigen::Vector3f origin = pose.translation().cast<float>();
+  // wanted = closeness * (depth * reach) + c x + s y, reach beside the left eye's view of the
+  // origin
+  Eigen::Matrix3f normal = Eigen::Matrix3f::Zero();
+  Eigen::Vector3f right = Eigen::Vector3f::Zero();
+  float known = 0;
+  for (std::size_t eye = 0; eye < 2; ++eye) {
+    if (!place.regions[eye]) continue;
+    const BrightRegion& region = *place.regions[eye];
+    known += region.known.sum();
+    const Extents wanted = (region.extents - c * static_cast<float>(camera_.center_u) -
+                            s * static_cast<float>(camera_.center_v)) /
+                           focal;
+    const Extents reach =
+        origin.z() * reachInImage(toParticlePose(pose), eye) - c * origin.x() - s * origin.y();
+    Eigen::Matrix<float, BrightRegion::kDirections, 3> columns;
+    columns << reach, c, s;
+    const Eigen::Matrix<float, 3, BrightRegion::kDirections> weighted =
+        columns.transpose() * region.known.matrix().asDiagonal();
+    normal += weighted * columns;
+    right += weighted * wanted.matrix();
+  }
+  if (known < kFewestDirections) return std::nullopt;
   Eigen::Vector3f found = normal.ldlt().solve(right);
-  if (!(found[0] > kLeastGrowth && found[0] < 1 / kLeastGrowth)) {
-    found[0] = found[0] > 1 ? 1 / kLeastGrowth : kLeastGrowth;
+  const float growth = found[0] * origin.z();
+  if (!(growth > kLeastGrowth && growth < 1 / kLeastGrowth)) {
+    found[0] = (growth > 1 ? 1 / kLeastGrowth : kLeastGrowth) / origin.z();
     found.tail<2>() = normal.bottomRightCorner<2, 2>().ldlt().solve(
         right.tail<2>() - normal.bottomLeftCorner<2, 1>() * found[0]);
   }
   if (!found.allFinite()) return std::nullopt;
   Pose fitted = pose;
-  const double depth = pose.translation().z() / static_cast<double>(found[0]);
-  fitted.translation() << static_cast<double>(found[1]) * depth + place.eye_x,
-      static_cast<double>(found[2]) * depth, depth;
+  fitted.translation() = (Eigen::Vector3f(found[1], found[2], 1) / found[0]).cast<double>();
   return fitted;
 }
 
@@ -319,11 +390,14 @@ void PoseSearch::scoreAll(std::vector<Hypothesis>& hypotheses, int points,
                                       &hypothesis.pose, 1, &hypothesis.score);
                         const Place* place =
                             hypothesis.place < places.size() ? &places[hypothesis.place] : nullptr;
-                        const auto seen = glance(hypothesis.pose, place ? place->eye_x : 0, points);
-                        if (!seen) continue;
+                        const std::size_t eye = place != nullptr && !place->regions[0] ? 1 : 0;
                         hypothesis.score -= kToBeExpected * kBlunt.log_ratio * kIndependentShare *
-                                            seen->length * static_cast<float>(eye_count);
-                        if (place) hypothesis.score -= hullDoubt(*seen, place->region);
+                                            contourLength(hypothesis.pose, eye, points) *
+                                            static_cast<float>(eye_count);
+                        for (std::size_t k = 0; place != nullptr && k < 2; ++k)
+                          if (place->regions[k])
+                            hypothesis.score -=
+                                hullDoubt(reachInImage(hypothesis.pose, k), *place->regions[k]);
                       }
                     });
 }
@@ -373,7 +447,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       Pose pose = Pose::Identity();
       pose.translation() = place;
       pose.linear() = facing * orientation;
-      const std::optional<Pose> fitted = fitToRegion(pose, places[index]);
+      const std::optional<Pose> fitted = fitToRegions(pose, places[index]);
       hypotheses.push_back({toParticlePose(fitted.value_or(pose)), 0, index});
     }
     scoreAll(hypotheses, kCoarsePoints, mapsFor(place.z(), 1), places);

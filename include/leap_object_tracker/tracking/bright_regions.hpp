@@ -2,13 +2,14 @@
 
 #include <Eigen/Dense>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 namespace leap_object_tracker {
 
 /// A part of an image that is brighter than all around it.
 struct BrightRegion {
-  static constexpr int kDirections = 16;
+  static constexpr int kDirections = 16, kRight = 0, kBelow = 4;
   using Extents = Eigen::Array<float, kDirections, 1>;
 
   double area = 0;               ///< [px^2] with its holes
@@ -21,6 +22,10 @@ struct BrightRegion {
 
   double middleU() const { return 0.5 * (low_u + high_u); }
   double middleV() const { return 0.5 * (low_v + high_v); }
+  bool isCut() const { return known.minCoeff() < 0.5F; }
+  /// [px] mean distance of both sides to those of another region, along a direction and its
+  /// opposite; of one side where a border cuts the other, nothing where it cuts both.
+  std::optional<double> apart(const BrightRegion& other, int direction) const;
   /// Cosine and sine of direction i: 2 pi i / kDirections, from +u towards +v.
   static const Extents& cosines();
   static const Extents& sines();

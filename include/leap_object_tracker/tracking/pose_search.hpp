@@ -3,6 +3,7 @@
 #include <array>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "leap_object_tracker/geometry/object_model.hpp"
@@ -21,11 +22,11 @@ namespace leap_object_tracker {
 
 /// Finds an object anywhere in the working volume, in one frame.
 ///
-/// 1. Places: stable bright regions of the left eye (findBrightRegions) whose size fits the object;
-///    depth from the same region in the right eye, else from the region's area.
+/// 1. Places: stable bright regions (findBrightRegions) whose size fits the object; depth from the
+///    same region in the other eye, else from the region's area.
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
-///    of equivalent ones, fitted to the reach of each region; scored by the blunt contour
-///    likelihood and by that reach.
+///    of equivalent ones, fitted to the reach of each region in both eyes; scored by the blunt
+///    contour likelihood and by that reach.
 /// 3. The best ones move in random steps that shrink, then are refined on sub-pixel edges.
 /// 4. The best of each place and its turned ones are compared on the contour of their exact views.
 class PoseSearch {
@@ -60,18 +61,21 @@ class PoseSearch {
     float score = 0;
     std::size_t place = 0;
   };
-  /// Where the object may be, and the region that it then fills in one eye.
+  /// Where the object may be, and the regions that it then fills.
   struct Place {
     Eigen::Vector3d point;  ///< [m]
     double doubt = 0;
-    BrightRegion region;
-    double eye_x = 0;  ///< [m] of the eye that sees the region
+    std::array<std::optional<BrightRegion>, 2> regions;  ///< by eye
   };
 
   std::vector<Place> findPlaces(const RectifiedStereoFrame& frame) const;
-  std::optional<ContourReach> glance(const ParticlePose& pose, double eye_x, int points) const;
-  float hullDoubt(const ContourReach& seen, const BrightRegion& region) const;
-  std::optional<Pose> fitToRegion(const Pose& pose, const Place& place) const;
+  /// Origin and rotation of the object as one eye sees them.
+  std::pair<Eigen::Vector3f, Eigen::Matrix3f> seenFrom(const ParticlePose& pose,
+                                                       std::size_t eye) const;
+  float contourLength(const ParticlePose& pose, std::size_t eye, int points) const;
+  BrightRegion::Extents reachInImage(const ParticlePose& pose, std::size_t eye) const;
+  float hullDoubt(const BrightRegion::Extents& reach, const BrightRegion& region) const;
+  std::optional<Pose> fitToRegions(const Pose& pose, const Place& place) const;
   std::vector<Hypothesis> distinct(std::vector<Hypothesis>& hypotheses, std::size_t count,
                                    double apart) const;
   double reachOf(const Pose& pose) const;
@@ -87,6 +91,8 @@ class PoseSearch {
   ShadedView shaded_view_;
   ShadowArea shadow_;                    ///< of the object from all sides
   std::vector<Eigen::Vector3d> pivots_;  ///< [m] of turned()
+  std::vector<float> hull_;              ///< outermost vertices, as arrays of a ContourView
+  Eigen::AlignedBox2f window_;           ///< of the image, over the focal length
   Symmetry symmetry_;
   std::vector<Eigen::Matrix3d> turns_;
   std::vector<Eigen::Matrix3d> orientations_;

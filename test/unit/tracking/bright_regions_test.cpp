@@ -50,6 +50,26 @@ TEST(BrightRegions, areFoundHoweverDim) {
   }
 }
 
+TEST(BrightRegions, tellHowFarTheyAreApart) {
+  const cv::Rect first(100, 60, 60, 40), second(80, 62, 60, 40), cut(260, 60, 60, 40);
+  const auto regionAt = [](const cv::Rect& box) {
+    cv::Mat image = dark();
+    image(box).setTo(100);
+    return nearestTo(findBrightRegions(image), box);
+  };
+  const BrightRegion a = regionAt(first), b = regionAt(second), c = regionAt(cut);
+  EXPECT_FALSE(a.isCut());
+  EXPECT_TRUE(c.isCut());
+  ASSERT_TRUE(a.apart(b, BrightRegion::kRight).has_value());
+  EXPECT_NEAR(*a.apart(b, BrightRegion::kRight), 20, 0.5);
+  EXPECT_NEAR(*a.apart(b, BrightRegion::kBelow), -2, 0.5);
+  // Only the left sides of both are seen.
+  EXPECT_NEAR(c.apart(a, BrightRegion::kRight).value_or(0), 160, 1);
+  BrightRegion hidden = c;
+  hidden.known.setZero();
+  EXPECT_FALSE(hidden.apart(a, BrightRegion::kRight).has_value());
+}
+
 TEST(BrightRegions, closeTheDarkTextureOfABody) {
   cv::Mat image = dark();
   const cv::Rect box(100, 60, 90, 70);

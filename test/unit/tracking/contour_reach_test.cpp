@@ -12,6 +12,8 @@ namespace {
 
 using Eigen::Vector3f;
 
+const Eigen::AlignedBox2f kEverything(Eigen::Vector2f(-1e3F, -1e3F), Eigen::Vector2f(1e3F, 1e3F));
+
 TEST(ContourReach, isThatOfItsPoints) {
   const ContourModel model(makePrimitive("box", Shape::kBox, {0.02, 0.04, 0.06}), 96);
   const Eigen::Matrix3f rotation =
@@ -22,8 +24,8 @@ TEST(ContourReach, isThatOfItsPoints) {
   const auto stride = static_cast<std::size_t>(model.points());
   const float* values = choice.view->arrays.data();
   for (const std::size_t count : {std::size_t{32}, stride}) {
-    const ContourReach reach = reachOfContour(values, stride, count, origin, rotation, 0.02F);
-    EXPECT_TRUE(reach.in_front);
+    const ContourReach reach =
+        reachOfContour(values, stride, count, origin, rotation, 0.02F, kEverything);
     float length = 0;
     Eigen::Array<float, ContourReach::kDirections, 1> extents;
     extents.setConstant(-1e9F);
@@ -46,18 +48,34 @@ TEST(ContourReach, isThatOfItsPoints) {
   }
 }
 
-TEST(ContourReach, tellsWhatComesTooNear) {
+TEST(ContourReach, staysFiniteBesideTheEye) {
   const ContourModel model(makePrimitive("cube", Shape::kBox, {0.03, 0.03, 0.03}), 96);
   const ViewChoice choice = model.choose(Vector3f(0, 0, -0.1F));
   ASSERT_NE(choice.view, nullptr);
   const auto stride = static_cast<std::size_t>(model.points());
-  const auto in_front = [&](float depth) {
+  const auto reach = [&](float depth) {
     return reachOfContour(choice.view->arrays.data(), stride, stride, Vector3f(0, 0, depth),
-                          Eigen::Matrix3f::Identity(), 0.02F)
-        .in_front;
+                          Eigen::Matrix3f::Identity(), 0.02F, kEverything)
+        .extents[0];
   };
-  EXPECT_TRUE(in_front(0.04F));
-  EXPECT_FALSE(in_front(0.03F)) << "its near face is 15 mm away";
+  EXPECT_NEAR(reach(0.05F), 0.015F / 0.035F, 1e-5F);
+  EXPECT_NEAR(reach(0.03F), 0.015F / 0.02F, 1e-5F) << "its near face is 15 mm away";
+  EXPECT_NEAR(reach(-0.1F), 0.015F / 0.02F, 1e-5F) << "it is behind the eye";
+}
+
+TEST(ContourReach, countsTheLengthInsideTheWindow) {
+  const ContourModel model(makePrimitive("cube", Shape::kBox, {0.03, 0.03, 0.03}), 96);
+  const ViewChoice choice = model.choose(Vector3f(0, 0, -0.1F));
+  ASSERT_NE(choice.view, nullptr);
+  const auto stride = static_cast<std::size_t>(model.points());
+  const auto length = [&](const Eigen::AlignedBox2f& window) {
+    return reachOfContour(choice.view->arrays.data(), stride, stride, Vector3f(0, 0, 0.1F),
+                          Eigen::Matrix3f::Identity(), 0.02F, window)
+        .length;
+  };
+  const float whole = length(kEverything);
+  EXPECT_NEAR(length({Eigen::Vector2f(-9, -9), Eigen::Vector2f(0, 9)}), whole / 2, 0.1F * whole);
+  EXPECT_EQ(length({Eigen::Vector2f(1, 1), Eigen::Vector2f(2, 2)}), 0);
 }
 
 }  // namespace
