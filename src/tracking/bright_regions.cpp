@@ -13,6 +13,7 @@ constexpr std::array<int, 19> kThresholds{5,  6,  8,  10, 12, 15,  18,  22,  27,
 constexpr std::array<int, 2> kGaps{9, 21};  // [px of half the size] that are closed
 constexpr double kSmallest = 40;            // [px^2]
 constexpr double kSameArea = 0.85;
+constexpr double kDimFaces = 1.15;  // growth of a region that is more than blur
 
 /// The region inside of a closed line of pixels of half the size.
 BrightRegion regionOf(const std::vector<cv::Point>& line, const cv::Size& size, int threshold,
@@ -62,6 +63,11 @@ void addRegions(const cv::Mat& half, int closing, std::vector<BrightRegion>& reg
     middle.faintest = chain.front().faintest;
     middle.brightest = chain.back().brightest;
     regions.push_back(middle);
+    // Faces that look away from the light show in the lowest one only.
+    BrightRegion whole = chain.front();
+    if (whole.area < kDimFaces * middle.area) return;
+    whole.brightest = middle.brightest;
+    regions.push_back(whole);
   };
   cv::Mat mask;
   std::vector<std::vector<cv::Point>> lines;

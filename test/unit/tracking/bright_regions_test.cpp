@@ -50,6 +50,16 @@ TEST(BrightRegions, areFoundHoweverDim) {
   }
 }
 
+TEST(BrightRegions, keepTheFacesThatLookAwayFromTheLight) {
+  cv::Mat image = dark();
+  const cv::Rect box(100, 60, 60, 80);
+  image(box).setTo(180);
+  // The lower half grows dark gradually, as a face seen from beside does.
+  for (int v = 100; v < box.br().y; ++v)
+    image(cv::Rect(box.x, v, box.width, 1)).setTo(180 - 4 * (v - 100));
+  expectBox(nearestTo(findBrightRegions(image), box), box, 2.5);
+}
+
 TEST(BrightRegions, tellHowFarTheyAreApart) {
   const cv::Rect first(100, 60, 60, 40), second(80, 62, 60, 40), cut(260, 60, 60, 40);
   const auto regionAt = [](const cv::Rect& box) {
