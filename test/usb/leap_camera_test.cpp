@@ -3,6 +3,7 @@
 #include <dirent.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -167,6 +168,16 @@ int openFiles() {
   return count;
 }
 
+// The bus below opens files of its own for moments, from other threads.
+int openFilesAtRest() {
+  int fewest = openFiles();
+  for (int i = 0; i < 50; ++i) {
+    std::this_thread::sleep_for(milliseconds(2));
+    fewest = std::min(fewest, openFiles());
+  }
+  return fewest;
+}
+
 TEST_F(LeapCameraTest, leavesNothingBehindAfterAThousandConnections) {
   port().plug(leap_);
   int files = 0;
@@ -180,9 +191,9 @@ TEST_F(LeapCameraTest, leavesNothingBehindAfterAThousandConnections) {
       port().plug(leap_);
     }
     ASSERT_EQ(0, port().usbfs().leftovers().requests) << "connection " << i;
-    if (i == 20) files = openFiles();
+    if (i == 20) files = openFilesAtRest();
   }
-  EXPECT_EQ(files, openFiles());
+  EXPECT_EQ(files, openFilesAtRest());
 }
 
 }  // namespace
