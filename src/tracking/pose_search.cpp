@@ -23,7 +23,7 @@ constexpr float kNearest = 0.01F;          // [m] of any part of a pose
 constexpr int kHullDirections = 100;       // in which the outermost vertices of the body are taken
 constexpr float kFewestDirections = 6;     // in which a region's reach must be known
 constexpr double kLeastInside = 0.6;       // of the area of a body that the border cuts
-constexpr float kLeastGrowth = 0.7F;       // of the projection, to fit a region
+constexpr float kLeastGrowth = 0.7F;       // of the projection, to fit a region or texture
 constexpr float kHullSpread = 1.5F;        // [px] of a region's reach
 constexpr float kWorstHull = 3;            // [nats] of one direction
 constexpr float kIndependentHull = 0.25F;  // share of directions that speak independently
@@ -39,6 +39,7 @@ constexpr std::size_t kPromising = 16;    // poses that are refined to the end
 constexpr double kReach = 0.2;            // of a pose's error, as a share of the object's radius
 constexpr std::size_t kAsked = 3;         // places whose best pose is offered
 constexpr double kHopelessSupport = 0.5;  // of a pose that turning it will not save
+constexpr double kHopelessToMove = 0.2;   // the same, of a pose not refined to the end
 constexpr std::size_t kExactlySeen = 8;   // of the turned poses that are compared at last
 constexpr double kShadedReach = 60;       // [nats] by which their contour may be worse
 constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
@@ -191,6 +192,7 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       model_(&model),
       refiner_(params.contour, camera),
       shaded_view_(object.mesh, camera),
+      agreement_(object.mesh, camera),
       shadow_(shadowAreaOf(object.mesh)),
       pivots_(pivotsOf(object.mesh)),
       hull_(outermostVertices(object.mesh)),
@@ -520,6 +522,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     const double reach = reachOf(starts[i]);
     refined[i] =
         refiner_.refine(*model_, fields_, starts[i], {}, {}, {reach, 0.8 * reach, 0.6 * reach});
+    toAgreeingDepth(refined[i]);
   });
   const std::size_t promising = std::min(kPromising, refined.size());
   std::partial_sort(refined.begin(), refined.begin() + static_cast<std::ptrdiff_t>(promising),
@@ -528,6 +531,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t i) {
     const Pose& pose = refined[i].camera_from_object;
     refined[i] = refiner_.refine(*model_, fields_, pose, {}, {}, {0.4 * reachOf(pose), 3, 2.5});
+    compareEyes(refined[i]);
   });
   std::sort(refined.begin(), refined.end(), better);
   std::optional<RefinedPose> best;
@@ -570,6 +574,23 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::distinct(std::vector<Hypothesis>
     kept.push_back(hypotheses[i]);
   }
   return kept;
+}
+
+/// Counts how the eyes agree on the texture of a refined pose.
+void PoseSearch::compareEyes(RefinedPose& refined) const {
+  refined.evidence += agreement_.compare(fields_, refined.camera_from_object).log_likelihood_ratio;
+}
+
+/// Moves a refined pose, whose contour may have been drawn away by texture, along its ray to where
+/// the eyes agree best, and counts what it wins there.
+void PoseSearch::toAgreeingDepth(RefinedPose& refined) const {
+  if (refined.support() < kHopelessToMove) return;
+  const EyeAgreement::Agreement agreement = agreement_.compare(fields_, refined.camera_from_object);
+  refined.evidence += agreement.best_ratio;
+  const double depth = refined.camera_from_object.translation().z();
+  const double growth =
+      1 - agreement.best_shift * depth / (camera_.focal_length * camera_.baseline);
+  if (growth > kLeastGrowth) refined.camera_from_object.translation() /= growth;
 }
 
 /// A body that looks nearly the same turned over or round may have been taken for it: the best of
@@ -617,7 +638,9 @@ RefinedPose PoseSearch::bestTurned(const RefinedPose& pose) const {
     RefinedPose& pose_there = refined[order[i]];
     pose_there.log_likelihood += shaded_view_.logLikelihood(fields_, pose_there.camera_from_object);
   });
-  return refined[*std::min_element(order.begin(), order.end(), likelier)];
+  RefinedPose& likeliest = refined[*std::min_element(order.begin(), order.end(), likelier)];
+  compareEyes(likeliest);
+  return likeliest;
 }
 
 void PoseSearch::learn(const Pose& camera_from_object, Appearance& appearance) const {

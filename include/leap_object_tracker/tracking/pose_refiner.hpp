@@ -52,7 +52,7 @@ struct RefinedPose {
   double log_likelihood = 0;  ///< sum over independent samples of the gain against chance [nats]
 
   /// The same without regard to what the image shows besides [nats]: compares poses of different
-  /// places.
+  /// places. With what EyeAgreement says, of poses that were searched for.
   double evidence = 0;
 
   /// Share of the contour that lies inside the images.

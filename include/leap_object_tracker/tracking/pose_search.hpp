@@ -14,6 +14,7 @@
 #include "leap_object_tracker/tracking/contour_model.hpp"
 #include "leap_object_tracker/tracking/contour_reach.hpp"
 #include "leap_object_tracker/tracking/edge_field.hpp"
+#include "leap_object_tracker/tracking/eye_agreement.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/shaded_view.hpp"
 #include "leap_object_tracker/tracking/tracker_params.hpp"
@@ -27,7 +28,8 @@ namespace leap_object_tracker {
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
 ///    of equivalent ones, fitted to the reach of each region in both eyes; scored by the blunt
 ///    contour likelihood and by that reach.
-/// 3. The best ones move in random steps that shrink, then are refined on sub-pixel edges.
+/// 3. The best ones move in random steps that shrink, then are refined on sub-pixel edges and
+///    ranked by their contour and by how the eyes agree on the texture inside it (EyeAgreement).
 /// 4. The best of each place and its turned ones are compared on the contour of their exact views.
 class PoseSearch {
  public:
@@ -79,6 +81,8 @@ class PoseSearch {
   std::vector<Hypothesis> distinct(std::vector<Hypothesis>& hypotheses, std::size_t count,
                                    double apart) const;
   double reachOf(const Pose& pose) const;
+  void compareEyes(RefinedPose& refined) const;
+  void toAgreeingDepth(RefinedPose& refined) const;
   RefinedPose bestTurned(const RefinedPose& pose) const;
   void scoreAll(std::vector<Hypothesis>& hypotheses, int points, const std::array<GainMap, 2>& maps,
                 const std::vector<Place>& places) const;
@@ -89,6 +93,7 @@ class PoseSearch {
   const ContourModel* model_;
   PoseRefiner refiner_;
   ShadedView shaded_view_;
+  EyeAgreement agreement_;
   ShadowArea shadow_;                    ///< of the object from all sides
   std::vector<Eigen::Vector3d> pivots_;  ///< [m] of turned()
   std::vector<float> hull_;              ///< outermost vertices, as arrays of a ContourView
