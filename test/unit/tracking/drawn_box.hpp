@@ -70,4 +70,11 @@ inline Pose poseAt(double x, double y, double z) {
   return pose;
 }
 
+/// Aslant beside the axis: three sides of a box show.
+inline Pose aslant() {
+  Pose pose = poseAt(0.02, 0, 0.16);
+  pose.linear() = rotationFromVector({0.35, 0.3, 0.2});
+  return pose;
+}
+
 }  // namespace leap_object_tracker

@@ -28,11 +28,7 @@ class EyesThatAgree : public ::testing::Test {
 
   const RectifiedStereoCamera camera_ = roundCamera();
   ObjectModel body_ = box(0.05, 0.05, 0.02);
-  const Pose truth_ = [] {
-    Pose pose = poseAt(0.02, 0, 0.16);
-    pose.linear() = rotationFromVector({0.35, 0.3, 0.2});
-    return pose;
-  }();
+  const Pose truth_ = aslant();
   std::array<EdgeField, 2> fields_;
   const EyeAgreement agreement_{body_.mesh, camera_};
 };
