@@ -330,6 +330,7 @@ std::optional<Pose> PoseSearch::fitToRegions(const Pose& pose, const Place& plac
   const Extents &c = BrightRegion::cosines(), &s = BrightRegion::sines();
   const auto focal = static_cast<float>(camera_.focal_length);
   const Eigen::Vector3f origin = pose.translation().cast<float>();
+  const ParticlePose view = toParticlePose(pose);
   // wanted = closeness * (depth * reach) + c x + s y, reach beside the left eye's view of the
   // origin
   Eigen::Matrix3f normal = Eigen::Matrix3f::Zero();
@@ -342,8 +343,7 @@ std::optional<Pose> PoseSearch::fitToRegions(const Pose& pose, const Place& plac
     const Extents wanted = (region.extents - c * static_cast<float>(camera_.center_u) -
                             s * static_cast<float>(camera_.center_v)) /
                            focal;
-    const Extents reach =
-        origin.z() * reachInImage(toParticlePose(pose), eye) - c * origin.x() - s * origin.y();
+    const Extents reach = origin.z() * reachInImage(view, eye) - c * origin.x() - s * origin.y();
     Eigen::Matrix<float, BrightRegion::kDirections, 3> columns;
     columns << reach, c, s;
     const Eigen::Matrix<float, 3, BrightRegion::kDirections> weighted =
