@@ -544,7 +544,12 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       continue;
     if (candidate.support() < kHopelessSupport) continue;
     asked.push_back(place);
-    const RefinedPose settled = bestTurned(candidate);
+    std::vector<Pose> rivals;
+    for (const RefinedPose& other : refined)
+      if (&other != &candidate && other.support() >= kHopelessSupport &&
+          (place - other.camera_from_object.translation()).norm() < model_->radius())
+        rivals.push_back(other.camera_from_object);
+    const RefinedPose settled = bestTurned(candidate, rivals);
     const double depth = settled.camera_from_object.translation().z();
     if (depth < params_.volume.nearest || depth > params_.volume.farthest) continue;
     if (accept(settled)) return settled;
@@ -595,7 +600,7 @@ void PoseSearch::toAgreeingDepth(RefinedPose& refined) const {
 
 /// A body that looks nearly the same turned over or round may have been taken for it: the best of
 /// the pose and its turned ones.
-RefinedPose PoseSearch::bestTurned(const RefinedPose& pose) const {
+RefinedPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Pose>& rivals) const {
   std::vector<Hypothesis> hypotheses;
   for (const Pose& other : turned(pose.camera_from_object))
     hypotheses.push_back({toParticlePose(other), 0, 0});
@@ -605,6 +610,13 @@ RefinedPose PoseSearch::bestTurned(const RefinedPose& pose) const {
   for (const Hypothesis& hypothesis : distinct(hypotheses, kTurned, 0.15))
     starts.push_back(toPose(hypothesis.pose));
   starts.push_back(pose.camera_from_object);
+  for (const Pose& rival : rivals) {
+    if (std::none_of(starts.begin(), starts.end(), [&](const Pose& known) {
+          return (rival.translation() - known.translation()).norm() < 0.05 * model_->radius() &&
+                 angleBetween(rival.linear(), known.linear(), symmetry_) < 0.05;
+        }))
+      starts.push_back(rival);
+  }
   std::vector<RefinedPose> refined(starts.size());
   std::vector<Appearance> looks(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {

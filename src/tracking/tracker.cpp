@@ -69,6 +69,9 @@ constexpr double kRefoundReach = 0.03;   // [m]
 constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
 constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;    // [nats/px] once, and until then
 constexpr double kFoundInside = 0.3;                 // share of the contour inside the images
+constexpr double kCompelling = 160;        // [nats] of evidence that chance does not bring about
+constexpr double kCompelledSupport = 0.6;  // and what then is enough
+constexpr double kCompelledInside = 0.15;  // likewise
 constexpr double kSureSupport = 0.7;                 // below it the search is asked for its opinion
 constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
 constexpr double kOpinionMargin = 20;                // [nats] by which another pose must be better
@@ -262,6 +265,8 @@ class Tracker::Impl {
     const bool near =
         last_seen_ &&
         (found.camera_from_object.translation() - last_seen_->translation()).norm() < kRefoundReach;
+    if (found.evidence >= kCompelling)
+      return found.support() >= kCompelledSupport && found.insideShare() >= kCompelledInside;
     return found.support() >= (near ? kRefoundSupport : kFoundSupport) &&
            found.strength() >= (near ? kRefoundStrength : kFoundStrength) &&
            found.insideShare() >= kFoundInside;
@@ -680,7 +685,9 @@ class Tracker::Impl {
     texture_support_ =
         features_.alone() ? 0 : surface_.support(measurement_.fields(), refined.camera_from_object);
     // What was never seen clearly since the start may be something else.
-    const double strength = features_.alone() ? kProvenStrength : refined.strength();
+    const bool compelling = refined.evidence >= kCompelling;
+    const double strength =
+        features_.alone() || compelling ? kProvenStrength : refined.strength();
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
     const bool supported =
         (proven_ || strength >= kLeastStrength) &&
@@ -691,7 +698,8 @@ class Tracker::Impl {
     if (confirming_) {
       confirming_ = false;
       frames_lost_ = 0;
-      if ((report_.support < kFoundSupport || strength < kLeastStrength) &&
+      if ((report_.support < (compelling ? kCompelledSupport : kFoundSupport) ||
+           strength < kLeastStrength) &&
           landmark_support < kLandmarkSupport)
         return;
     }

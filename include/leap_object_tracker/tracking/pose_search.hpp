@@ -83,7 +83,7 @@ class PoseSearch {
   double reachOf(const Pose& pose) const;
   void compareEyes(RefinedPose& refined) const;
   void toAgreeingDepth(RefinedPose& refined) const;
-  RefinedPose bestTurned(const RefinedPose& pose) const;
+  RefinedPose bestTurned(const RefinedPose& pose, const std::vector<Pose>& rivals) const;
   void scoreAll(std::vector<Hypothesis>& hypotheses, int points, const std::array<GainMap, 2>& maps,
                 const std::vector<Place>& places) const;
   const std::array<GainMap, 2>& mapsFor(double depth, int sharpening = 0) const;
