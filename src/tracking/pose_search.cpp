@@ -27,6 +27,10 @@ constexpr float kLeastGrowth = 0.7F;       // of the projection, to fit a region
 constexpr float kHullSpread = 1.5F;        // [px] of a region's reach
 constexpr float kWorstHull = 3;            // [nats] of one direction
 constexpr float kIndependentHull = 0.25F;  // share of directions that speak independently
+constexpr std::size_t kShaped = 400;       // hypotheses of a place whose outline is fitted to it
+constexpr int kShapeSteps = 5;
+constexpr float kShapeShift = 0.3F;        // of the depth, by which it may move in one step
+constexpr float kShapeTurn = 0.3F;         // [rad] likewise
 constexpr int kCoarsePoints = 32;          // of the contour, for the first look
 constexpr std::size_t kLikelyPlaces = 3;   // first by how well their region fits
 constexpr std::size_t kKeptAtLikely = 30;  // hypotheses of such a place that move on
@@ -140,6 +144,17 @@ std::vector<float> outermostVertices(const Mesh& mesh) {
   return arrays;
 }
 
+/// The points of such arrays, each once.
+Eigen::Matrix3Xf pointsOf(const std::vector<float>& arrays) {
+  const auto count = static_cast<Eigen::Index>(arrays.size() / 6);
+  const Eigen::Matrix3Xf all =
+      Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, 3>>(arrays.data(), count, 3)
+          .transpose();
+  Eigen::Index last = count;
+  while (last > 1 && all.col(last - 1) == all.col(last - 2)) --last;
+  return all.leftCols(last);
+}
+
 Eigen::AlignedBox2f windowOf(const RectifiedStereoCamera& camera) {
   const Eigen::Vector2d center(camera.center_u, camera.center_v);
   const Eigen::Vector2d size(camera.size.width - 1, camera.size.height - 1);
@@ -196,6 +211,7 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       shadow_(shadowAreaOf(object.mesh)),
       pivots_(pivotsOf(object.mesh)),
       hull_(outermostVertices(object.mesh)),
+      hull_points_(pointsOf(hull_)),
       window_(windowOf(camera)),
       symmetry_(object.symmetry),
       turns_(turnsToTry(object.symmetry)),
@@ -365,6 +381,75 @@ std::optional<Pose> PoseSearch::fitToRegions(const Pose& pose, const Place& plac
   return fitted;
 }
 
+/// Adds the best hypotheses of a place once more, shaped to its regions.
+void PoseSearch::shape(std::vector<Hypothesis>& hypotheses,
+                       const std::vector<Place>& places) const {
+  const std::size_t count = std::min(kShaped, hypotheses.size());
+  std::nth_element(hypotheses.begin(), hypotheses.begin() + static_cast<std::ptrdiff_t>(count - 1),
+                   hypotheses.end(),
+                   [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
+  std::vector<Hypothesis> shaped(hypotheses.begin(),
+                                 hypotheses.begin() + static_cast<std::ptrdiff_t>(count));
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    const Place& place = places[shaped[i].place];
+    shaped[i].pose = toParticlePose(shapedToRegions(toPose(shaped[i].pose), place));
+    shaped[i].score = 0;
+  });
+  scoreAll(shaped, kCoarsePoints, mapsFor(places[shaped.front().place].point.z(), 1), places);
+  hypotheses.insert(hypotheses.end(), shaped.begin(), shaped.end());
+}
+
+/// Turns and moves a pose until its outline reaches as far as the regions in all directions:
+/// Gauss-Newton of the extents, each of which one vertex sets. Where the border cuts a region, the
+/// body may reach farther.
+Pose PoseSearch::shapedToRegions(const Pose& start, const Place& place) const {
+  const BrightRegion::Extents &c = BrightRegion::cosines(), &s = BrightRegion::sines();
+  const auto focal = static_cast<float>(camera_.focal_length);
+  Eigen::Matrix3Xf arms(3, hull_points_.cols());
+  Eigen::RowVectorXf u(hull_points_.cols()), v(hull_points_.cols());
+  Pose pose = start;
+  for (int i = 0; i < kShapeSteps; ++i) {
+    const auto depth = static_cast<float>(std::max(0.03, pose.translation().z()));
+    Eigen::Matrix<float, 6, 6> normal = Eigen::Matrix<float, 6, 6>::Zero();
+    Eigen::Matrix<float, 6, 1> right = Eigen::Matrix<float, 6, 1>::Zero();
+    normal.diagonal() << Eigen::Array3f::Constant(1 / std::pow(kShapeShift * depth, 2.0F)),
+        Eigen::Array3f::Constant(1 / (kShapeTurn * kShapeTurn));
+    arms.noalias() = pose.linear().cast<float>() * hull_points_;
+    for (std::size_t eye = 0; eye < 2; ++eye) {
+      if (!place.regions[eye]) continue;
+      const BrightRegion& region = *place.regions[eye];
+      const float spread = kHullSpread + 0.02F * static_cast<float>(std::sqrt(region.area));
+      Eigen::Vector3f origin = pose.translation().cast<float>();
+      if (eye == 1) origin.x() -= static_cast<float>(camera_.baseline);
+      const auto inverse = (arms.row(2).array() + origin.z()).max(kNearest).inverse().eval();
+      u = (arms.row(0).array() + origin.x()) * inverse;
+      v = (arms.row(1).array() + origin.y()) * inverse;
+      for (Eigen::Index k = 0; k < BrightRegion::kDirections; ++k) {
+        Eigen::Index farthest = 0;
+        const float reach = (c[k] * u + s[k] * v).maxCoeff(&farthest);
+        const float apart = region.extents[k] - focal * reach -
+                            c[k] * static_cast<float>(camera_.center_u) -
+                            s[k] * static_cast<float>(camera_.center_v);
+        if (region.known[k] < 0.5F && apart < 0) continue;
+        const float off = apart / (kWorstHull * spread);
+        const float weight = 1 / (spread * spread * (1 + off * off));
+        const Eigen::Vector3f slope =
+            focal * inverse[farthest] * Eigen::Vector3f(c[k], s[k], -reach);
+        Eigen::Matrix<float, 6, 1> row;
+        row << slope, arms.col(farthest).cross(slope);
+        normal.noalias() += weight * row * row.transpose();
+        right += weight * apart * row;
+      }
+    }
+    Twist step = normal.ldlt().solve(right).cast<double>();
+    if (!step.allFinite()) break;
+    const double turn = step.tail<3>().norm();
+    if (turn > kShapeTurn) step *= kShapeTurn / turn;
+    pose = normalized(movedInCamera(pose, step));
+  }
+  return pose;
+}
+
 const std::array<GainMap, 2>& PoseSearch::mapsFor(double depth, int sharpening) const {
   const double radius = camera_.focal_length * model_->radius() / depth;
   const int level = radius < 30 ? 1 : radius < 80 ? 2 : 3;
@@ -453,6 +538,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       hypotheses.push_back({toParticlePose(fitted.value_or(pose)), 0, index});
     }
     scoreAll(hypotheses, kCoarsePoints, mapsFor(place.z(), 1), places);
+    shape(hypotheses, places);
     for (const Hypothesis& hypothesis :
          distinct(hypotheses, index < kLikelyPlaces ? kKeptAtLikely : kKeptElsewhere, 0.2))
       kept.push_back(hypothesis);

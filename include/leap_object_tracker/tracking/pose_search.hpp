@@ -78,6 +78,8 @@ class PoseSearch {
   BrightRegion::Extents reachInImage(const ParticlePose& pose, std::size_t eye) const;
   float hullDoubt(const BrightRegion::Extents& reach, const BrightRegion& region) const;
   std::optional<Pose> fitToRegions(const Pose& pose, const Place& place) const;
+  Pose shapedToRegions(const Pose& start, const Place& place) const;
+  void shape(std::vector<Hypothesis>& hypotheses, const std::vector<Place>& places) const;
   std::vector<Hypothesis> distinct(std::vector<Hypothesis>& hypotheses, std::size_t count,
                                    double apart) const;
   double reachOf(const Pose& pose) const;
@@ -97,6 +99,7 @@ class PoseSearch {
   ShadowArea shadow_;                    ///< of the object from all sides
   std::vector<Eigen::Vector3d> pivots_;  ///< [m] of turned()
   std::vector<float> hull_;              ///< outermost vertices, as arrays of a ContourView
+  Eigen::Matrix3Xf hull_points_;         ///< [m] the same
   Eigen::AlignedBox2f window_;           ///< of the image, over the focal length
   Symmetry symmetry_;
   std::vector<Eigen::Matrix3d> turns_;
