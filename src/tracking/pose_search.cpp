@@ -122,8 +122,8 @@ std::vector<Eigen::Matrix3d> turnsToTry(const Symmetry& symmetry) {
   return turns;
 }
 
-/// The outermost vertices of a mesh by direction, as the arrays of a ContourView: as many as fill
-/// whole blocks of 16.
+/// The outermost vertices of a mesh by direction, as arrays of x, y and z: as many as fill whole
+/// blocks of 16.
 std::vector<float> outermostVertices(const Mesh& mesh) {
   std::vector<std::size_t> chosen;
   for (int i = 0; i < kHullDirections; ++i) {
@@ -136,23 +136,12 @@ std::vector<float> outermostVertices(const Mesh& mesh) {
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   while (chosen.size() % 16 != 0) chosen.push_back(chosen.back());
-  std::vector<float> arrays(6 * chosen.size(), 0);
+  std::vector<float> arrays(3 * chosen.size());
   for (std::size_t i = 0; i < chosen.size(); ++i)
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       arrays[static_cast<std::size_t>(axis) * chosen.size() + i] =
           static_cast<float>(mesh.vertices[chosen[i]][axis]);
   return arrays;
-}
-
-/// The points of such arrays, each once.
-Eigen::Matrix3Xf pointsOf(const std::vector<float>& arrays) {
-  const auto count = static_cast<Eigen::Index>(arrays.size() / 6);
-  const Eigen::Matrix3Xf all =
-      Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, 3>>(arrays.data(), count, 3)
-          .transpose();
-  Eigen::Index last = count;
-  while (last > 1 && all.col(last - 1) == all.col(last - 2)) --last;
-  return all.leftCols(last);
 }
 
 Eigen::AlignedBox2f windowOf(const RectifiedStereoCamera& camera) {
@@ -211,7 +200,6 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       shadow_(shadowAreaOf(object.mesh)),
       pivots_(pivotsOf(object.mesh)),
       hull_(outermostVertices(object.mesh)),
-      hull_points_(pointsOf(hull_)),
       window_(windowOf(camera)),
       symmetry_(object.symmetry),
       turns_(turnsToTry(object.symmetry)),
@@ -313,17 +301,16 @@ float PoseSearch::contourLength(const ParticlePose& pose, std::size_t eye, int p
   turn(0, 0) = turn(1, 1) = choice.cosine;
   turn(0, 1) = -choice.sine;
   turn(1, 0) = choice.sine;
-  const ContourReach seen = reachOfContour(
-      choice.view->arrays.data(), static_cast<std::size_t>(model_->points()),
-      static_cast<std::size_t>(points), origin, object_rotation * turn, kNearest, window_);
-  return seen.length * static_cast<float>(camera_.focal_length);
+  return contourLengthInside(choice.view->arrays.data(), static_cast<std::size_t>(model_->points()),
+                             static_cast<std::size_t>(points), origin, object_rotation * turn,
+                             kNearest, window_) *
+         static_cast<float>(camera_.focal_length);
 }
 
 /// How far the body reaches in the image of one eye, over the focal length.
 BrightRegion::Extents PoseSearch::reachInImage(const ParticlePose& pose, std::size_t eye) const {
   const auto [origin, rotation] = seenFrom(pose, eye);
-  const std::size_t count = hull_.size() / 6;
-  return reachOfContour(hull_.data(), count, count, origin, rotation, kNearest, window_).extents;
+  return reachOfPoints(hull_.data(), hull_.size() / 3, origin, rotation, kNearest).extents;
 }
 
 /// [nats] by which the reach of a region speaks against a pose.
@@ -405,38 +392,37 @@ void PoseSearch::shape(std::vector<Hypothesis>& hypotheses,
 Pose PoseSearch::shapedToRegions(const Pose& start, const Place& place) const {
   const BrightRegion::Extents &c = BrightRegion::cosines(), &s = BrightRegion::sines();
   const auto focal = static_cast<float>(camera_.focal_length);
-  Eigen::Matrix3Xf arms(3, hull_points_.cols());
-  Eigen::RowVectorXf u(hull_points_.cols()), v(hull_points_.cols());
+  const auto hull = static_cast<Eigen::Index>(hull_.size() / 3);
+  const Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, 3>> points(hull_.data(), hull, 3);
   Pose pose = start;
   for (int i = 0; i < kShapeSteps; ++i) {
     const auto depth = static_cast<float>(std::max(0.03, pose.translation().z()));
+    const Eigen::Matrix3f rotation = pose.linear().cast<float>();
     Eigen::Matrix<float, 6, 6> normal = Eigen::Matrix<float, 6, 6>::Zero();
     Eigen::Matrix<float, 6, 1> right = Eigen::Matrix<float, 6, 1>::Zero();
-    normal.diagonal() << Eigen::Array3f::Constant(1 / std::pow(kShapeShift * depth, 2.0F)),
-        Eigen::Array3f::Constant(1 / (kShapeTurn * kShapeTurn));
-    arms.noalias() = pose.linear().cast<float>() * hull_points_;
+    normal.diagonal().head<3>().setConstant(1 / std::pow(kShapeShift * depth, 2.0F));
+    normal.diagonal().tail<3>().setConstant(1 / (kShapeTurn * kShapeTurn));
     for (std::size_t eye = 0; eye < 2; ++eye) {
       if (!place.regions[eye]) continue;
       const BrightRegion& region = *place.regions[eye];
       const float spread = kHullSpread + 0.02F * static_cast<float>(std::sqrt(region.area));
       Eigen::Vector3f origin = pose.translation().cast<float>();
       if (eye == 1) origin.x() -= static_cast<float>(camera_.baseline);
-      const auto inverse = (arms.row(2).array() + origin.z()).max(kNearest).inverse().eval();
-      u = (arms.row(0).array() + origin.x()) * inverse;
-      v = (arms.row(1).array() + origin.y()) * inverse;
+      const PointReach reach =
+          reachOfPoints(hull_.data(), hull_.size() / 3, origin, rotation, kNearest);
       for (Eigen::Index k = 0; k < BrightRegion::kDirections; ++k) {
-        Eigen::Index farthest = 0;
-        const float reach = (c[k] * u + s[k] * v).maxCoeff(&farthest);
-        const float apart = region.extents[k] - focal * reach -
+        const float apart = region.extents[k] - focal * reach.extents[k] -
                             c[k] * static_cast<float>(camera_.center_u) -
                             s[k] * static_cast<float>(camera_.center_v);
         if (region.known[k] < 0.5F && apart < 0) continue;
         const float off = apart / (kWorstHull * spread);
         const float weight = 1 / (spread * spread * (1 + off * off));
-        const Eigen::Vector3f slope =
-            focal * inverse[farthest] * Eigen::Vector3f(c[k], s[k], -reach);
+        const Eigen::Vector3f arm = rotation * points.row(reach.farthest[k]).transpose();
+        const Eigen::Vector3f slope = focal / std::max(kNearest, origin.z() + arm.z()) *
+                                      Eigen::Vector3f(c[k], s[k], -reach.extents[k]);
         Eigen::Matrix<float, 6, 1> row;
-        row << slope, arms.col(farthest).cross(slope);
+        row.head<3>() = slope;
+        row.tail<3>() = arm.cross(slope);
         normal.noalias() += weight * row * row.transpose();
         right += weight * apart * row;
       }
@@ -652,16 +638,41 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::distinct(std::vector<Hypothesis>
   std::partial_sort(hypotheses.begin(), hypotheses.begin() + static_cast<std::ptrdiff_t>(looked_at),
                     hypotheses.end(),
                     [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
+  // Orientations are as alike as the dot product of what is seen of them: all of the rotation, or
+  // the free axis.
+  using Look = Eigen::Matrix<float, 9, 1>;
+  using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
+  const auto lookOf = [&](const RowMajor& rotation) {
+    Look look = Look::Zero();
+    if (symmetry_.hasFreeAxis())
+      look.head<3>() = rotation * symmetry_.free_axis.cast<float>();
+    else
+      look = Eigen::Map<const Look>(rotation.data());
+    return look;
+  };
+  const auto cosine = static_cast<float>(std::cos(apart));
+  const float alike = symmetry_.hasFreeAxis() ? cosine : 1 + 2 * cosine;
+  const float near = static_cast<float>(apart * model_->radius());
   std::vector<Hypothesis> kept;
-  std::vector<Pose> poses;
+  std::vector<Look> looks;  // of each that is kept, all that look the same
   for (std::size_t i = 0; i < looked_at && kept.size() < count; ++i) {
-    const Pose pose = toPose(hypotheses[i].pose);
-    const bool known = std::any_of(poses.begin(), poses.end(), [&](const Pose& other) {
-      return (pose.translation() - other.translation()).norm() < apart * model_->radius() &&
-             angleBetween(pose.linear(), other.linear(), symmetry_) < apart;
-    });
+    const ParticlePose& pose = hypotheses[i].pose;
+    const RowMajor rotation = Eigen::Map<const RowMajor>(pose.rotation.data());
+    const Look look = lookOf(rotation);
+    bool known = false;
+    for (std::size_t k = 0; k < kept.size() && !known; ++k) {
+      const Eigen::Vector3f between =
+          Eigen::Map<const Eigen::Vector3f>(pose.translation.data()) -
+          Eigen::Map<const Eigen::Vector3f>(kept[k].pose.translation.data());
+      if (between.squaredNorm() >= near * near) continue;
+      const auto first =
+          looks.begin() + static_cast<std::ptrdiff_t>(k * symmetry_.rotations.size());
+      known = std::any_of(first, first + static_cast<std::ptrdiff_t>(symmetry_.rotations.size()),
+                          [&](const Look& other) { return look.dot(other) > alike; });
+    }
     if (known) continue;
-    poses.push_back(pose);
+    for (const Eigen::Matrix3d& same : symmetry_.rotations)
+      looks.push_back(lookOf(rotation * same.cast<float>()));
     kept.push_back(hypotheses[i]);
   }
   return kept;

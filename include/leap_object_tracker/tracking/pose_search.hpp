@@ -98,8 +98,7 @@ class PoseSearch {
   EyeAgreement agreement_;
   ShadowArea shadow_;                    ///< of the object from all sides
   std::vector<Eigen::Vector3d> pivots_;  ///< [m] of turned()
-  std::vector<float> hull_;              ///< outermost vertices, as arrays of a ContourView
-  Eigen::Matrix3Xf hull_points_;         ///< [m] the same
+  std::vector<float> hull_;              ///< [m] outermost vertices: all x, y, z
   Eigen::AlignedBox2f window_;           ///< of the image, over the focal length
   Symmetry symmetry_;
   std::vector<Eigen::Matrix3d> turns_;
