@@ -13,7 +13,7 @@
 namespace leap_object_tracker {
 namespace {
 
-constexpr int kOrientations = 4400;  // about 15 deg apart over all of SO(3)
+constexpr int kOrientations = 1200;  // about 23 deg apart over all of SO(3)
 constexpr std::size_t kMostPlaces = 10;
 constexpr double kWorstArea = 1.4;  // log of the ratio to the object's largest or least shadow
 constexpr double kDoubtOfOneEye = 0.5, kDoubtOfClosing = 0.1;
