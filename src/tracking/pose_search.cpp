@@ -37,12 +37,15 @@ constexpr std::size_t kKeptAtLikely = 30;  // hypotheses of such a place that mo
 constexpr std::size_t kKeptElsewhere = 8;
 constexpr int kChildren = 20;  // random steps of each, a round
 constexpr int kRounds = 4;
-constexpr std::size_t kRefinedAtLikely = 8;
-constexpr std::size_t kRefinedElsewhere = 2;
+constexpr std::size_t kRefinedAtLikely = 5;
+constexpr std::size_t kRefinedElsewhere = 1;
+constexpr std::size_t kUnmovedAtLikely = 5, kUnmovedElsewhere = 1;
 constexpr std::size_t kPromising = 16;    // poses that are refined to the end
 constexpr double kReach = 0.2;            // of a pose's error, as a share of the object's radius
 constexpr std::size_t kAsked = 3;         // places whose best pose is offered
 constexpr double kHopelessSupport = 0.5;  // of a pose that turning it will not save
+constexpr double kClearTexture = 30;      // [nats] of the eyes' agreement that may move a pose
+constexpr double kLeastInImages = 0.1;    // of the contour of a pose
 constexpr double kHopelessToMove = 0.2;   // the same, of a pose not refined to the end
 constexpr std::size_t kExactlySeen = 8;   // of the turned poses that are compared at last
 constexpr double kShadedReach = 60;       // [nats] by which their contour may be worse
@@ -548,6 +551,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   if (kept.empty()) return std::nullopt;
 
   // Each of the kept moves to the best of its children, in steps that shrink.
+  const std::vector<Hypothesis> unmoved = kept;
   for (int round = 0; round < kRounds; ++round) {
     const double size = std::pow(0.6, round);
     tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t i) {
@@ -584,6 +588,12 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     for (const Hypothesis& hypothesis :
          distinct(here, here.size() > kKeptElsewhere ? kRefinedAtLikely : kRefinedElsewhere, 0.3))
       starts.push_back(toPose(hypothesis.pose));
+    // Shaped ones may be better than what edges made of them.
+    std::vector<Hypothesis> before(unmoved.begin() + static_cast<std::ptrdiff_t>(first),
+                                   unmoved.begin() + static_cast<std::ptrdiff_t>(last));
+    for (const Hypothesis& hypothesis :
+         distinct(before, here.size() > kKeptElsewhere ? kUnmovedAtLikely : kUnmovedElsewhere, 0.3))
+      starts.push_back(toPose(hypothesis.pose));
     first = last;
   }
   std::vector<RefinedPose> refined(starts.size());
@@ -596,6 +606,14 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
         refiner_.refine(*model_, fields_, starts[i], {}, {}, {reach, 0.8 * reach, 0.6 * reach});
     toAgreeingDepth(refined[i]);
   });
+  // What lies outside of the images has no evidence against it.
+  refined.erase(std::remove_if(refined.begin(), refined.end(),
+                               [](const RefinedPose& pose) {
+                                 return pose.insideShare() < kLeastInImages ||
+                                        pose.support() < kHopelessToMove;
+                               }),
+                refined.end());
+  if (refined.empty()) return std::nullopt;
   const std::size_t promising = std::min(kPromising, refined.size());
   std::partial_sort(refined.begin(), refined.begin() + static_cast<std::ptrdiff_t>(promising),
                     refined.end(), better);
@@ -692,7 +710,8 @@ void PoseSearch::toAgreeingDepth(RefinedPose& refined) const {
   const double depth = refined.camera_from_object.translation().z();
   const double growth =
       1 - agreement.best_shift * depth / (camera_.focal_length * camera_.baseline);
-  if (growth > kLeastGrowth) refined.camera_from_object.translation() /= growth;
+  if (growth > kLeastGrowth && agreement.best_ratio > kClearTexture)
+    refined.camera_from_object.translation() /= growth;
 }
 
 /// A body that looks nearly the same turned over or round may have been taken for it: the best of
