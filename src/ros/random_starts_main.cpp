@@ -99,7 +99,10 @@ class RandomStarts {
         scenes_(static_cast<int>(wholeNumber(line, "scenes", 10, 1, 1000))),
         seed_(static_cast<std::uint64_t>(
             wholeNumber(line, "seed", 1, 0, std::numeric_limits<long long>::max()))) {
-    for (const auto& path : line.positional()) objects_.push_back(loadObject(path));
+    for (const auto& path : line.positional()) {
+      objects_.push_back(loadObject(path));
+      objects_.back().textured.reset();  // their paint is drawn at random
+    }
     if (line.has("only")) only_ = static_cast<int>(line.wholeNumber("only", 0, number_ - 1));
     if (line.has("save")) fs::create_directories(line.text("save"));
     if (!line.has("csv")) return;
