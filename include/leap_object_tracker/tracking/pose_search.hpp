@@ -26,11 +26,14 @@ namespace leap_object_tracker {
 /// 1. Places: stable bright regions (findBrightRegions) whose size fits the object; depth from the
 ///    same region in the other eye, else from the region's area.
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
-///    of equivalent ones, fitted to the reach of each region in both eyes; scored by the blunt
-///    contour likelihood and by that reach.
-/// 3. The best ones move in random steps that shrink, then are refined on sub-pixel edges and
-///    ranked by their contour and by how the eyes agree on the texture inside it (EyeAgreement).
-/// 4. The best of each place and its turned ones are compared on the contour of their exact views.
+///    of equivalent ones, shifted and scaled to the reach of each region in both eyes; scored by
+///    the blunt contour likelihood and by that reach. The best are fitted to it in all six
+///    directions.
+/// 3. The best ones move in random steps that shrink; before and after that they are refined on
+///    sub-pixel edges, and ranked by their contour and by how the eyes agree on the texture inside
+///    it (EyeAgreement).
+/// 4. The best of each place, its turned ones and what else was found there are compared on the
+///    contour of their exact views.
 class PoseSearch {
  public:
   PoseSearch(const TrackerParams& params, const ObjectModel& object, const ContourModel& model,

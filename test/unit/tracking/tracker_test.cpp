@@ -62,6 +62,31 @@ TEST_F(MovingBox, isFoundFromNothingWithinThreeFrames) {
             0.05);
 }
 
+TEST(NearBox, isFoundThoughTheBorderCutsIt) {
+  const RectifiedStereoCamera camera = roundCamera();
+  const ObjectModel object = box(0.04, 0.06, 0.09);
+  int found = 0;
+  constexpr int kPoses = 16;
+  for (int i = 0; i < kPoses; ++i) {
+    Pose truth = Pose::Identity();
+    truth.translation() << 0.02 + 0.07 * std::cos(0.8 * i), 0.07 * std::sin(0.8 * i), 0.06;
+    truth.linear() = rotationFromVector({0.4 + 0.5 * i, 0.7 - 0.3 * i, 0.2 * i});
+    Tracker tracker(TrackerParams(), object, camera);
+    tracker.search();
+    std::optional<PoseEstimate> estimate;
+    for (int frame = 0; frame < 3; ++frame)
+      estimate = tracker.track(drawnFrame(object, truth, camera, 1 + frame * kPeriod));
+    if (!estimate) continue;
+    const double turn =
+        angleBetween(estimate->camera_from_object.linear(), truth.linear(), object.symmetry);
+    const double shift = (estimate->camera_from_object.translation() - truth.translation()).norm();
+    found += shift < 0.002 && turn < 0.035;
+    EXPECT_LT(shift, 0.01) << i;
+    EXPECT_LT(turn, 0.17) << i;
+  }
+  EXPECT_EQ(found, kPoses);
+}
+
 TEST_F(MovingBox, isGivenUpWhenItIsGoneAndFoundAgain) {
   Tracker tracker(TrackerParams(), object_, camera_);
   tracker.start(truthAt(0));
