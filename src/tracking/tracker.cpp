@@ -68,11 +68,11 @@ constexpr double kRefoundSupport = 0.6;  // the same, close to where the object 
 constexpr double kRefoundReach = 0.03;   // [m]
 constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
 constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;    // [nats/px] once, and until then
-constexpr double kFoundInside = 0.3;                 // share of the contour inside the images
+constexpr double kFoundInside = 0.3;       // share of the contour inside the images
 constexpr double kCompelling = 160;        // [nats] of evidence that chance does not bring about
 constexpr double kCompelledSupport = 0.6;  // and what then is enough
 constexpr double kCompelledInside = 0.15;  // likewise
-constexpr double kSureSupport = 0.7;                 // below it the search is asked for its opinion
+constexpr double kSureSupport = 0.7;       // below it the search is asked for its opinion
 constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
 constexpr double kOpinionMargin = 20;                // [nats] by which another pose must be better
 constexpr double kOpinionSupport = 0.15;             // and have more support
@@ -686,8 +686,7 @@ class Tracker::Impl {
         features_.alone() ? 0 : surface_.support(measurement_.fields(), refined.camera_from_object);
     // What was never seen clearly since the start may be something else.
     const bool compelling = refined.evidence >= kCompelling;
-    const double strength =
-        features_.alone() || compelling ? kProvenStrength : refined.strength();
+    const double strength = features_.alone() || compelling ? kProvenStrength : refined.strength();
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
     const bool supported =
         (proven_ || strength >= kLeastStrength) &&
