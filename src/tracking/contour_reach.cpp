@@ -48,6 +48,7 @@ void reachOf(const float* arrays, std::size_t count, const Eigen::Vector3f& orig
   const BlockTag df;
   const hn::RebindToSigned<BlockTag> di;
   alignas(64) std::array<float, kBlock> x, y;
+  const float *cosines = BrightRegion::cosines().data(), *sines = BrightRegion::sines().data();
   reach.extents.setConstant(-1e9F);
   reach.farthest.setZero();
   for (std::size_t block = 0; block < count; block += kBlock) {
@@ -57,8 +58,8 @@ void reachOf(const float* arrays, std::size_t count, const Eigen::Vector3f& orig
       hn::Store(at.v, df, y.data() + k);
     }
     for (std::size_t i = 0; i < BrightRegion::kDirections; i += hn::Lanes(df)) {
-      const Float c = hn::LoadU(df, BrightRegion::cosines().data() + i);
-      const Float s = hn::LoadU(df, BrightRegion::sines().data() + i);
+      const Float c = hn::LoadU(df, cosines + i);
+      const Float s = hn::LoadU(df, sines + i);
       Float most = hn::LoadU(df, reach.extents.data() + i);
       auto farthest = hn::LoadU(di, reach.farthest.data() + i);
       for (std::size_t k = 0; k < kBlock; ++k) {

@@ -147,6 +147,11 @@ std::vector<float> outermostVertices(const Mesh& mesh) {
   return arrays;
 }
 
+/// [px] standard deviation of a region's reach.
+float spreadOf(const BrightRegion& region) {
+  return kHullSpread + 0.02F * static_cast<float>(std::sqrt(region.area));
+}
+
 Eigen::AlignedBox2f windowOf(const RectifiedStereoCamera& camera) {
   const Eigen::Vector2d center(camera.center_u, camera.center_v);
   const Eigen::Vector2d size(camera.size.width - 1, camera.size.height - 1);
@@ -316,16 +321,19 @@ BrightRegion::Extents PoseSearch::reachInImage(const ParticlePose& pose, std::si
   return reachOfPoints(hull_.data(), hull_.size() / 3, origin, rotation, kNearest).extents;
 }
 
+/// [px] by which a region reaches farther than a body does, whose reach is over the focal length.
+BrightRegion::Extents PoseSearch::apart(const BrightRegion& region,
+                                        const BrightRegion::Extents& reach) const {
+  return region.extents - static_cast<float>(camera_.focal_length) * reach -
+         BrightRegion::cosines() * static_cast<float>(camera_.center_u) -
+         BrightRegion::sines() * static_cast<float>(camera_.center_v);
+}
+
 /// [nats] by which the reach of a region speaks against a pose.
 float PoseSearch::hullDoubt(const BrightRegion::Extents& reach, const BrightRegion& region) const {
-  const auto focal = static_cast<float>(camera_.focal_length);
-  const BrightRegion::Extents apart =
-      region.extents - focal * reach -
-      BrightRegion::cosines() * static_cast<float>(camera_.center_u) -
-      BrightRegion::sines() * static_cast<float>(camera_.center_v);
-  const auto size = static_cast<float>(std::sqrt(region.area));
-  const float spread = kHullSpread + 0.02F * size;
-  return (region.known * (0.5F * (apart / spread).square()).min(kWorstHull)).sum() *
+  return (region.known *
+          (0.5F * (apart(region, reach) / spreadOf(region)).square()).min(kWorstHull))
+             .sum() *
          kIndependentHull;
 }
 
@@ -400,7 +408,7 @@ Pose PoseSearch::shapedToRegions(const Pose& start, const Place& place) const {
   Pose pose = start;
   for (int i = 0; i < kShapeSteps; ++i) {
     const auto depth = static_cast<float>(std::max(0.03, pose.translation().z()));
-    const Eigen::Matrix3f rotation = pose.linear().cast<float>();
+    const ParticlePose view = toParticlePose(pose);
     Eigen::Matrix<float, 6, 6> normal = Eigen::Matrix<float, 6, 6>::Zero();
     Eigen::Matrix<float, 6, 1> right = Eigen::Matrix<float, 6, 1>::Zero();
     normal.diagonal().head<3>().setConstant(1 / std::pow(kShapeShift * depth, 2.0F));
@@ -408,17 +416,14 @@ Pose PoseSearch::shapedToRegions(const Pose& start, const Place& place) const {
     for (std::size_t eye = 0; eye < 2; ++eye) {
       if (!place.regions[eye]) continue;
       const BrightRegion& region = *place.regions[eye];
-      const float spread = kHullSpread + 0.02F * static_cast<float>(std::sqrt(region.area));
-      Eigen::Vector3f origin = pose.translation().cast<float>();
-      if (eye == 1) origin.x() -= static_cast<float>(camera_.baseline);
+      const float spread = spreadOf(region);
+      const auto [origin, rotation] = seenFrom(view, eye);
       const PointReach reach =
           reachOfPoints(hull_.data(), hull_.size() / 3, origin, rotation, kNearest);
+      const BrightRegion::Extents farther = apart(region, reach.extents);
       for (Eigen::Index k = 0; k < BrightRegion::kDirections; ++k) {
-        const float apart = region.extents[k] - focal * reach.extents[k] -
-                            c[k] * static_cast<float>(camera_.center_u) -
-                            s[k] * static_cast<float>(camera_.center_v);
-        if (region.known[k] < 0.5F && apart < 0) continue;
-        const float off = apart / (kWorstHull * spread);
+        if (region.known[k] < 0.5F && farther[k] < 0) continue;
+        const float off = farther[k] / (kWorstHull * spread);
         const float weight = 1 / (spread * spread * (1 + off * off));
         const Eigen::Vector3f arm = rotation * points.row(reach.farthest[k]).transpose();
         const Eigen::Vector3f slope = focal / std::max(kNearest, origin.z() + arm.z()) *
@@ -427,7 +432,7 @@ Pose PoseSearch::shapedToRegions(const Pose& start, const Place& place) const {
         row.head<3>() = slope;
         row.tail<3>() = arm.cross(slope);
         normal.noalias() += weight * row * row.transpose();
-        right += weight * apart * row;
+        right += weight * farther[k] * row;
       }
     }
     Twist step = normal.ldlt().solve(right).cast<double>();
@@ -583,17 +588,16 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   for (std::size_t first = 0; first < kept.size();) {
     std::size_t last = first;
     while (last < kept.size() && kept[last].place == kept[first].place) ++last;
-    std::vector<Hypothesis> here(kept.begin() + static_cast<std::ptrdiff_t>(first),
-                                 kept.begin() + static_cast<std::ptrdiff_t>(last));
-    for (const Hypothesis& hypothesis :
-         distinct(here, here.size() > kKeptElsewhere ? kRefinedAtLikely : kRefinedElsewhere, 0.3))
-      starts.push_back(toPose(hypothesis.pose));
+    const bool likely = last - first > kKeptElsewhere;
+    const auto addBest = [&](const std::vector<Hypothesis>& all, std::size_t count) {
+      std::vector<Hypothesis> here(all.begin() + static_cast<std::ptrdiff_t>(first),
+                                   all.begin() + static_cast<std::ptrdiff_t>(last));
+      for (const Hypothesis& hypothesis : distinct(here, count, 0.3))
+        starts.push_back(toPose(hypothesis.pose));
+    };
+    addBest(kept, likely ? kRefinedAtLikely : kRefinedElsewhere);
     // Shaped ones may be better than what edges made of them.
-    std::vector<Hypothesis> before(unmoved.begin() + static_cast<std::ptrdiff_t>(first),
-                                   unmoved.begin() + static_cast<std::ptrdiff_t>(last));
-    for (const Hypothesis& hypothesis :
-         distinct(before, here.size() > kKeptElsewhere ? kUnmovedAtLikely : kUnmovedElsewhere, 0.3))
-      starts.push_back(toPose(hypothesis.pose));
+    addBest(unmoved, likely ? kUnmovedAtLikely : kUnmovedElsewhere);
     first = last;
   }
   std::vector<RefinedPose> refined(starts.size());
@@ -606,7 +610,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
         refiner_.refine(*model_, fields_, starts[i], {}, {}, {reach, 0.8 * reach, 0.6 * reach});
     toAgreeingDepth(refined[i]);
   });
-  // What lies outside of the images has no evidence against it.
+  // What lies outside of the images has no evidence against it, and what no edge supports is lost.
   refined.erase(std::remove_if(refined.begin(), refined.end(),
                                [](const RefinedPose& pose) {
                                  return pose.insideShare() < kLeastInImages ||
@@ -656,41 +660,16 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::distinct(std::vector<Hypothesis>
   std::partial_sort(hypotheses.begin(), hypotheses.begin() + static_cast<std::ptrdiff_t>(looked_at),
                     hypotheses.end(),
                     [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
-  // Orientations are as alike as the dot product of what is seen of them: all of the rotation, or
-  // the free axis.
-  using Look = Eigen::Matrix<float, 9, 1>;
-  using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
-  const auto lookOf = [&](const RowMajor& rotation) {
-    Look look = Look::Zero();
-    if (symmetry_.hasFreeAxis())
-      look.head<3>() = rotation * symmetry_.free_axis.cast<float>();
-    else
-      look = Eigen::Map<const Look>(rotation.data());
-    return look;
-  };
-  const auto cosine = static_cast<float>(std::cos(apart));
-  const float alike = symmetry_.hasFreeAxis() ? cosine : 1 + 2 * cosine;
-  const float near = static_cast<float>(apart * model_->radius());
   std::vector<Hypothesis> kept;
-  std::vector<Look> looks;  // of each that is kept, all that look the same
+  std::vector<Pose> poses;
   for (std::size_t i = 0; i < looked_at && kept.size() < count; ++i) {
-    const ParticlePose& pose = hypotheses[i].pose;
-    const RowMajor rotation = Eigen::Map<const RowMajor>(pose.rotation.data());
-    const Look look = lookOf(rotation);
-    bool known = false;
-    for (std::size_t k = 0; k < kept.size() && !known; ++k) {
-      const Eigen::Vector3f between =
-          Eigen::Map<const Eigen::Vector3f>(pose.translation.data()) -
-          Eigen::Map<const Eigen::Vector3f>(kept[k].pose.translation.data());
-      if (between.squaredNorm() >= near * near) continue;
-      const auto first =
-          looks.begin() + static_cast<std::ptrdiff_t>(k * symmetry_.rotations.size());
-      known = std::any_of(first, first + static_cast<std::ptrdiff_t>(symmetry_.rotations.size()),
-                          [&](const Look& other) { return look.dot(other) > alike; });
-    }
+    const Pose pose = toPose(hypotheses[i].pose);
+    const bool known = std::any_of(poses.begin(), poses.end(), [&](const Pose& other) {
+      return (pose.translation() - other.translation()).norm() < apart * model_->radius() &&
+             angleBetween(pose.linear(), other.linear(), symmetry_) < apart;
+    });
     if (known) continue;
-    for (const Eigen::Matrix3d& same : symmetry_.rotations)
-      looks.push_back(lookOf(rotation * same.cast<float>()));
+    poses.push_back(pose);
     kept.push_back(hypotheses[i]);
   }
   return kept;

@@ -79,6 +79,7 @@ class PoseSearch {
                                                        std::size_t eye) const;
   float contourLength(const ParticlePose& pose, std::size_t eye, int points) const;
   BrightRegion::Extents reachInImage(const ParticlePose& pose, std::size_t eye) const;
+  BrightRegion::Extents apart(const BrightRegion& region, const BrightRegion::Extents& reach) const;
   float hullDoubt(const BrightRegion::Extents& reach, const BrightRegion& region) const;
   std::optional<Pose> fitToRegions(const Pose& pose, const Place& place) const;
   Pose shapedToRegions(const Pose& start, const Place& place) const;
