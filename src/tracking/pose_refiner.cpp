@@ -34,6 +34,7 @@ constexpr double kMissedOutline = 1.5, kMissedCrease = 0.7;
 // bright; as shares of the brightness beside the outline that is found.
 constexpr double kMissedDark = 0.6, kMissedBright = 2;
 constexpr double kDarkShare = 0.2, kBrightShare = 0.6;
+constexpr float kInnerRoom = 5.5F;  // [px] to the next line that this brightness needs
 // [px] that are searched however close the next line is: to move a pose, and to judge it, for which
 // it does not matter which of the two an edge belongs to.
 constexpr double kCrowdedRange = 0.75, kCrowdedReach = 1.6;
@@ -306,7 +307,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           return 0.5F * (mean(k - kRegionReach, k - 1) - mean(k + 2, k + 1 + kRegionReach));
         };
         if (region) match.region = regionAt(0);
-        if (match.outline && low <= -4)
+        if (match.outline && low <= -4 && match.before < -kInnerRoom)
           match.inner = (profile[static_cast<std::size_t>(span - 2)] +
                          profile[static_cast<std::size_t>(span - 3)] +
                          profile[static_cast<std::size_t>(span - 4)]) /
@@ -506,8 +507,11 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
       continue;
     }
     double missed = m.expected * (m.outline ? kMissedOutline : kMissedCrease);
-    if (m.outline && !m.found && m.inner >= 0 && typical[static_cast<std::size_t>(m.eye)] > 0) {
-      const double share = static_cast<double>(m.inner) / typical[static_cast<std::size_t>(m.eye)];
+    if (m.outline && !m.found && typical[static_cast<std::size_t>(m.eye)] > 0) {
+      // A face too narrow to be looked at is as bright as it is turned to the lamps.
+      const double share =
+          m.inner >= 0 ? static_cast<double>(m.inner) / typical[static_cast<std::size_t>(m.eye)]
+                       : static_cast<double>(std::abs(m.step)) / m.length;
       missed *= kMissedDark +
                 (kMissedBright - kMissedDark) *
                     std::clamp((share - kDarkShare) / (kBrightShare - kDarkShare), 0.0, 1.0);
@@ -540,7 +544,8 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     fitted += m.samples;
     misfit += m.samples * std::log(std::clamp(m.noise, 1.0, 20.0));
   }
-  if (fitted > 0) result.log_likelihood -= kMisfitWeight * all * misfit / fitted;
+  if (fitted > 0) result.misfit = kMisfitWeight * all * misfit / fitted;
+  result.log_likelihood -= result.misfit;
   const SurfaceEvidence texture = evidenceOf(appearance.texture, fields, pose);
   result.texture_information = texture.information;
   result.information += texture.information;

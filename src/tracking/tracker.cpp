@@ -11,6 +11,7 @@
 
 #include "leap_object_tracker/tracking/contour_measurement.hpp"
 #include "leap_object_tracker/tracking/feature_tracking.hpp"
+#include "leap_object_tracker/tracking/mirrored_poses.hpp"
 #include "leap_object_tracker/tracking/particle_budget.hpp"
 #include "leap_object_tracker/tracking/particle_filter.hpp"
 #include "leap_object_tracker/tracking/pose_belief.hpp"
@@ -46,6 +47,8 @@ constexpr double kLeastTurn = 0.15;       // [rad] of a least bound direction th
 constexpr double kFarthestTurn = 0.4;     // [rad] of one that nothing binds
 constexpr double kClearlyBetter = 8;      // [nats] by which such a pose must be better
 constexpr double kDoubtCost = 5;          // [nats] against a pose that says so
+constexpr double kNearMisfit = 0.3;       // of RefinedPose::misfit, between poses close to each other
+constexpr double kMirroredMargin = 2;  // [nats] by which a mirrored pose must be better
 constexpr double kLeastSupport = 0.40;    // share of the contour to stand by a pose
 constexpr double kLeastExactSupport = 0.28;  // the same, if what is seen lies exactly on edges
 constexpr double kLearningSupport = 0.7;     // of a pose at which the object's looks are learned
@@ -109,6 +112,7 @@ class Tracker::Impl {
         budget_(params.filter),
         measurement_(params.contour, params.eyes, camera),
         refiner_(params.contour, camera),
+        mirrored_(object),
         surface_(object, camera),
         features_(params, object_, camera),
         search_(params, object_, model_, camera),
@@ -490,6 +494,19 @@ class Tracker::Impl {
     if (score(better) > score(best) + kClearlyBetter) best = better;
   }
 
+  /// Where a face or an axis looks the other way, the image is nearly the same.
+  template <class Score>
+  void tryMirrored(const PosePrior& prior, const Score& score, RefinedPose& best) const {
+    const std::vector<Pose> starts = mirrored_.of(best.camera_from_object);
+    std::vector<RefinedPose> tried(starts.size());
+    tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
+      tried[i] = refiner_.refine(model_, measurement_.fields(), starts[i], prior, appearance_,
+                                 {5, 3.5, 2.5});
+    });
+    for (const RefinedPose& other : tried)
+      if (score(other) > score(best) + kMirroredMargin) best = other;
+  }
+
   void scoreParticles() {
     using Sharpness = ContourMeasurement::Sharpness;
     const auto scorer = [&](Sharpness sharpness) {
@@ -571,7 +588,8 @@ class Tracker::Impl {
     tbb::parallel_for(std::size_t{1}, starts.size(), refine);
 
     const auto score = [&](const RefinedPose& candidate) {
-      return candidate.log_likelihood + features_.score(candidate.camera_from_object) -
+      return candidate.log_likelihood + (1 - kNearMisfit) * candidate.misfit +
+             features_.score(candidate.camera_from_object) -
              std::min(surprise(prior, candidate.camera_from_object),
                       kDoubtCost + surprise(doubted, candidate.camera_from_object));
     };
@@ -618,6 +636,7 @@ class Tracker::Impl {
         if (score(candidate) > score(best)) best = candidate;
     }
     tryLeastBound(doubted, score, best);
+    tryMirrored(doubted, score, best);
     // Where both lead to one place, features know more: the turn that the contour does not show.
     const auto agree = [&](const Pose& a, const Pose& b) {
       const double pixel = same / 2.5;
@@ -734,6 +753,7 @@ class Tracker::Impl {
   ParticleBudget budget_;
   ContourMeasurement measurement_;
   PoseRefiner refiner_;
+  MirroredPoses mirrored_;
   TexturedSurface surface_;
   FeatureTracking features_;
   PoseSearch search_;

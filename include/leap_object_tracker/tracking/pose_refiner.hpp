@@ -50,6 +50,7 @@ struct RefinedPose {
   double bright_inside =
       0;  ///< share of supported outline on whose inner side the image is brighter
   double log_likelihood = 0;  ///< sum over independent samples of the gain against chance [nats]
+  double misfit = 0;          ///< [nats] of it, against lines too many or missing
 
   /// The same without regard to what the image shows besides [nats]: compares poses of different
   /// places. With what EyeAgreement says, of poses that were searched for.
