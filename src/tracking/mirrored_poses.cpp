@@ -1,6 +1,5 @@
 #include "leap_object_tracker/tracking/mirrored_poses.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -11,16 +10,6 @@ namespace {
 constexpr double kNormalStep = 0.06;          // within which normals belong to one face
 constexpr double kLeastArea = 0.08;           // share of the surface that a face must have
 constexpr double kLeast = 0.04, kMost = 0.7;  // [rad] from the line of sight
-
-/// The pose turned about a point of the camera frame.
-Pose turnedAbout(const Pose& pose, const Eigen::Vector3d& point, const Eigen::Vector3d& axis,
-                 double angle) {
-  const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
-  Pose turned = pose;
-  turned.linear() = turn * pose.linear();
-  turned.translation() = point + turn * (pose.translation() - point);
-  return turned;
-}
 
 }  // namespace
 
@@ -54,24 +43,27 @@ MirroredPoses::MirroredPoses(const ObjectModel& object) : symmetry_(object.symme
 
 std::vector<Pose> MirroredPoses::of(const Pose& camera_from_object) const {
   std::vector<Pose> poses;
-  const auto add = [&](const Eigen::Vector3d& point, const Eigen::Vector3d& axis, double angle) {
-    if (angle > kLeast && angle < kMost)
-      poses.push_back(turnedAbout(camera_from_object, point, axis, 2 * angle));
+  // Turned about a point of the camera frame, from one direction to another.
+  const auto add = [&](const Eigen::Vector3d& point, const Eigen::Vector3d& from,
+                       const Eigen::Vector3d& to) {
+    const auto turn = Eigen::Quaterniond::FromTwoVectors(from, to);
+    const double half = std::atan2(turn.vec().norm(), turn.w());
+    if (half > kLeast && half < kMost)
+      poses.push_back(Eigen::Translation3d(point) * turn * Eigen::Translation3d(-point) *
+                      camera_from_object);
   };
   for (const Face& face : faces_) {
     const Eigen::Vector3d centre = camera_from_object * face.centre;
     const Eigen::Vector3d normal = camera_from_object.linear() * face.normal;
     const Eigen::Vector3d sight = -centre.normalized();
-    const Eigen::Vector3d across = normal.cross(sight);
-    if (normal.dot(sight) > 0) add(centre, across, std::asin(std::min(1.0, across.norm())));
+    const double facing = normal.dot(sight);
+    if (facing > 0) add(centre, normal, 2 * facing * sight - normal);
   }
   if (symmetry_.hasFreeAxis()) {
     const Eigen::Vector3d centre = camera_from_object.translation();
     const Eigen::Vector3d axis = camera_from_object.linear() * symmetry_.free_axis;
-    const double along = -axis.dot(centre.normalized());  // towards the camera
-    // Turned back towards the image plane, and as far beyond it.
-    const Eigen::Vector3d sight = -centre.normalized() * (along < 0 ? -1 : 1);
-    add(centre, sight.cross(axis), std::asin(std::min(1.0, std::abs(along))));
+    const Eigen::Vector3d sight = -centre.normalized();
+    add(centre, axis, axis - 2 * axis.dot(sight) * sight);
   }
   return poses;
 }

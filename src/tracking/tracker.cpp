@@ -469,6 +469,17 @@ class Tracker::Impl {
     return deviation.cwiseAbs2().asDiagonal();
   }
 
+  /// From starts close to the best pose.
+  std::vector<RefinedPose> refineAll(const std::vector<Pose>& starts,
+                                     const PosePrior& prior) const {
+    std::vector<RefinedPose> refined(starts.size());
+    tbb::parallel_for(std::size_t{0}, refined.size(), [&](std::size_t i) {
+      refined[i] = refiner_.refine(model_, measurement_.fields(), starts[i], prior, appearance_,
+                                   {5, 3.5, 2.5});
+    });
+    return refined;
+  }
+
   /// The image hardly tells a pose from others along the direction that moves its contour least:
   /// one of those takes its place if it is clearly better.
   template <class Score>
@@ -484,12 +495,10 @@ class Tracker::Impl {
     // Farther than that, the image says nothing of it.
     if (best.leverage.isZero() || turn < kLeastTurn || turn > kFarthestTurn) return;
     const Twist step = turn * model_.radius() * scale.asDiagonal() * solver.eigenvectors().col(0);
-    std::array<RefinedPose, 2> tried;
-    tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
-      const Pose other = movedInCamera(best.camera_from_object, i == 0 ? step : Twist(-step));
-      tried[i] =
-          refiner_.refine(model_, measurement_.fields(), other, prior, appearance_, {5, 3.5, 2.5});
-    });
+    const std::vector<RefinedPose> tried =
+        refineAll({movedInCamera(best.camera_from_object, step),
+                   movedInCamera(best.camera_from_object, Twist(-step))},
+                  prior);
     const RefinedPose& better = score(tried[1]) > score(tried[0]) ? tried[1] : tried[0];
     if (score(better) > score(best) + kClearlyBetter) best = better;
   }
@@ -497,13 +506,7 @@ class Tracker::Impl {
   /// Where a face or an axis looks the other way, the image is nearly the same.
   template <class Score>
   void tryMirrored(const PosePrior& prior, const Score& score, RefinedPose& best) const {
-    const std::vector<Pose> starts = mirrored_.of(best.camera_from_object);
-    std::vector<RefinedPose> tried(starts.size());
-    tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t i) {
-      tried[i] = refiner_.refine(model_, measurement_.fields(), starts[i], prior, appearance_,
-                                 {5, 3.5, 2.5});
-    });
-    for (const RefinedPose& other : tried)
+    for (const RefinedPose& other : refineAll(mirrored_.of(best.camera_from_object), prior))
       if (score(other) > score(best) + kMirroredMargin) best = other;
   }
 
