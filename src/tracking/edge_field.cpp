@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 namespace leap_object_tracker {
@@ -26,6 +27,40 @@ const cv::Mat& varianceStabilizer() {
     return values;
   }();
   return table;
+}
+
+// Patches all over the image, of which a quarter are taken to show noise alone.
+constexpr int kPatch = 16;  // [px]
+constexpr int kPatchesAcross = 8, kPatchesDown = 6;
+constexpr double kPlainShare = 0.25;
+constexpr float kNoisier = 2;  // than those a region may be
+
+/// Standard deviation of a gradient image, from its mean magnitude.
+float meanDeviation(const ImageMemory<std::int16_t>& gradient) {
+  int sum = 0;
+  for (int v = 0; v < gradient.rows(); ++v)
+    for (int u = 0; u < gradient.columns(); ++u) sum += std::abs(gradient.row(v)[u]);
+  const double mean = static_cast<double>(sum) / (gradient.rows() * gradient.columns());
+  return static_cast<float>(mean * std::sqrt(M_PI / 2));
+}
+
+/// Standard deviation of the gradients of a whole image where it is plain: textured surroundings
+/// are no noise.
+float plainDeviation(const cv::Mat& image, EdgeDetector& detector) {
+  if (image.cols < 2 * kPatch || image.rows < 2 * kPatch) return std::numeric_limits<float>::max();
+  std::array<float, kPatchesAcross * kPatchesDown> deviations;
+  std::size_t count = 0;
+  for (int y = 0; y < kPatchesDown; ++y)
+    for (int x = 0; x < kPatchesAcross; ++x) {
+      const cv::Rect patch((image.cols - kPatch) * x / (kPatchesAcross - 1),
+                           (image.rows - kPatch) * y / (kPatchesDown - 1), kPatch, kPatch);
+      detector.differentiate(image(patch), varianceStabilizer().ptr<std::uint8_t>());
+      deviations[count++] = std::max(meanDeviation(detector.du()), meanDeviation(detector.dv()));
+    }
+  const auto plain = deviations.begin() +
+                     static_cast<std::ptrdiff_t>(kPlainShare * static_cast<double>(count));
+  std::nth_element(deviations.begin(), plain, deviations.end());
+  return *plain;
 }
 
 /// Standard deviation of a gradient image, from its median magnitude: edges are few.
@@ -60,10 +95,12 @@ void EdgeField::build(const cv::Mat& image, const cv::Rect& region) {
   image_ = image(region_);
   detector_.smooth(image_, 16, smooth_memory_);
   smooth_ = cv::Mat(image_.size(), CV_16SC1, smooth_memory_.row(0));
+  const float plain = plainDeviation(image, detector_);
   detector_.differentiate(image_, varianceStabilizer().ptr<std::uint8_t>());
 
   constexpr float kWeakest = 20;  // a step of 5 grey levels of 255 after smoothing
-  const float noise = std::max(robustDeviation(detector_.du()), robustDeviation(detector_.dv()));
+  const float noise =
+      std::min(kNoisier * plain, std::max(robustDeviation(detector_.du()), robustDeviation(detector_.dv())));
   // A Sobel response is 8 slopes; back from the stabilised scale by its derivative.
   const auto slope_noise =
       static_cast<float>(std::max(kLeastNoise, static_cast<double>(noise)) / 8 / kStabilizedScale);

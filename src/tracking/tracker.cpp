@@ -69,6 +69,9 @@ constexpr double kFoundSupport = 0.68;   // share of the contour that a found po
 constexpr double kSureStart = 0.80;      // support that needs no other frame to prove itself
 constexpr double kRefoundSupport = 0.6;  // the same, close to where the object was last
 constexpr double kRefoundReach = 0.03;   // [m]
+// Less is enough where the object was a moment ago, and nobody else looks like it there.
+constexpr double kSameReach = 0.015, kSameTurn = 0.35;  // [m], [rad]
+constexpr double kSameSupport = 0.48, kSameStrength = 0.12;
 constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
 constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;    // [nats/px] once, and until then
 constexpr double kFoundInside = 0.3;       // share of the contour inside the images
@@ -186,7 +189,7 @@ class Tracker::Impl {
     if (report_.state != TrackerState::kTracking && !confirming_) {
       lookFor(frame, camera_motion);
       // Another body may look the same: one that was tracked before must prove itself.
-      const bool sure = !remembered_ && report_.support >= kSureStart;
+      const bool sure = (!remembered_ && report_.support >= kSureStart) || found_same_;
       if (!confirming_ || !sure) return std::nullopt;
       camera_motion.setIdentity();  // the pose is that of this frame
     }
@@ -259,13 +262,23 @@ class Tracker::Impl {
         last_seen_.reset(), report_.state = TrackerState::kSearching;
       return;
     }
+    found_same_ = sameAsLast(*found);
     takeUp(known.value_or(asLastSeen(found->camera_from_object)), frame.stamp, known.has_value());
     beginLooks(std::clamp(found->bright_inside, 0.3, 0.9));
     search_.learn(belief_.pose, appearance_);
   }
 
+  /// Whether the object is seen, if only in part, where it was last.
+  bool sameAsLast(const RefinedPose& found) const {
+    const Pose& pose = found.camera_from_object;
+    return last_seen_ && (pose.translation() - last_seen_->translation()).norm() < kSameReach &&
+           angleBetween(pose.linear(), last_seen_->linear(), object_.symmetry) < kSameTurn &&
+           found.support() >= kSameSupport && found.strength() >= kSameStrength;
+  }
+
   /// Whether a pose that was searched for may be the object's.
   bool goodStart(const RefinedPose& found) const {
+    if (sameAsLast(found)) return true;
     const bool near =
         last_seen_ &&
         (found.camera_from_object.translation() - last_seen_->translation()).norm() < kRefoundReach;
@@ -711,7 +724,7 @@ class Tracker::Impl {
     const double strength = features_.alone() || compelling ? kProvenStrength : refined.strength();
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
     const bool supported =
-        (proven_ || strength >= kLeastStrength) &&
+        (proven_ || strength >= kLeastStrength || (confirming_ && sameAsLast(refined))) &&
         !features_.contradict(refined.camera_from_object, refined.bestEyeSupport()) &&
         (report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
          texture_support_ >= kTextureSupport ||
@@ -721,7 +734,7 @@ class Tracker::Impl {
       frames_lost_ = 0;
       if ((report_.support < (compelling ? kCompelledSupport : kFoundSupport) ||
            strength < kLeastStrength) &&
-          landmark_support < kLandmarkSupport)
+          landmark_support < kLandmarkSupport && !sameAsLast(refined))
         return;
     }
     if (supported) {
@@ -780,6 +793,7 @@ class Tracker::Impl {
   bool fresh_ = false;
   bool proven_ = false;             ///< seen clearly since the start
   bool confirming_ = false;         ///< the last search found something
+  bool found_same_ = false;         ///< where the object was last
   std::optional<Pose> last_seen_;   ///< where the object was when the tracker stood by it
   std::optional<Pose> remembered_;  ///< the same, for as long as it takes
 };
