@@ -33,7 +33,7 @@ const cv::Mat& varianceStabilizer() {
 constexpr int kPatch = 16;  // [px]
 constexpr int kPatchesAcross = 8, kPatchesDown = 6;
 constexpr double kPlainShare = 0.25;
-constexpr float kNoisier = 2;  // than those a region may be
+constexpr float kNoisier = 3;  // than those a region may be
 
 /// Standard deviation of a gradient image, from its mean magnitude.
 float meanDeviation(const ImageMemory<std::int16_t>& gradient) {

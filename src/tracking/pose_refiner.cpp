@@ -496,7 +496,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   const double last_range = 2.5;
   match(model, fields, pose, exact, last_range, appearance, true, kCrowdedReach, matches,
         result.eyes);
-  const std::optional<int> hidden = ignoreHiddenEye(matches);
+  const std::optional<int> hidden = result.hidden_eye = ignoreHiddenEye(matches);
   const double deviation = robustScale(last_range);
   result.residual = deviation;
   double bright = 0, judged = 0, found = 0;

@@ -716,7 +716,7 @@ class Tracker::Impl {
 
   void takeOver(const RefinedPose& refined) {
     const double landmark_support = features_.support(refined.camera_from_object);
-    report_.support = features_.alone() ? landmark_support : refined.support();
+    report_.support = features_.alone() ? landmark_support : refined.seenSupport();
     texture_support_ =
         features_.alone() ? 0 : surface_.support(measurement_.fields(), refined.camera_from_object);
     // What was never seen clearly since the start may be something else.
@@ -758,7 +758,7 @@ class Tracker::Impl {
       report_.state = TrackerState::kLost;
       frames_lost_ = 0;
     }
-    features_.conclude(belief_, supported, refined.support());
+    features_.conclude(belief_, supported, refined.seenSupport());
     fresh_ = false;
     filter_.resample(params_.filter.resample_below);
     if (supported)

@@ -46,6 +46,7 @@ struct RefinedPose {
   /// the camera twist: how far the contour moves with the pose, whatever the noise.
   Matrix6d leverage = Matrix6d::Zero();
   std::array<EyeSupport, 2> eyes;
+  std::optional<int> hidden_eye;  ///< from which something seems to hide the object
   double residual = 0;  ///< [px] robust standard deviation of the edges about the contour
   double bright_inside =
       0;  ///< share of supported outline on whose inner side the image is brighter
@@ -71,9 +72,15 @@ struct RefinedPose {
   /// Share of the contour that the eye supports which sees it best.
   double bestEyeSupport() const { return std::max(eyes[0].share(), eyes[1].share()); }
 
+  /// Share of the contour that the eyes support, both together.
   double support() const {
     const double visible = eyes[0].visible + eyes[1].visible;
     return visible > 0 ? (eyes[0].supported + eyes[1].supported) / visible : 0;
+  }
+
+  /// The same without an eye from which something hides the object.
+  double seenSupport() const {
+    return hidden_eye ? eyes[static_cast<std::size_t>(1 - *hidden_eye)].share() : support();
   }
 };
 
