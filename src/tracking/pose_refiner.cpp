@@ -44,6 +44,9 @@ constexpr double kTextureRange = 4.5;   // [px] ranges below this look at the te
 constexpr double kFine = 2.6;           // [px] ranges below this are searched by fitted steps
 constexpr int kProfile = 7;             // [px] half length of a profile that steps are fitted to
 constexpr double kLargestShift = 2;     // [px] of a fitted step
+constexpr int kShortProfile = 3;        // [px] the same, beside texture
+constexpr double kTexturedNoise = 3;    // [grey levels] that a fit leaves there
+constexpr double kShortShare = 0.5;     // of which a short one must leave no more
 // [px^2] that smoothing, slopes by differences and bilinear interpolation add to its square.
 constexpr double kSearchBlur = 1.9;
 constexpr float kIgnoredCosine = 0.6F;
@@ -460,12 +463,25 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
     grey[static_cast<std::size_t>(k - first)] =
         image(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
   const double blur = std::sqrt(std::pow(kBlurU * nu, 2) + std::pow(kBlurV * nv, 2));
-  const auto edge =
-      fitProfile(grey.data(), first, last - first + 1, blur,
-                 {static_cast<double>(match.before), static_cast<double>(match.after)});
-  if (!edge || std::abs(edge->offset) > kLargestShift) return;
-  match.offset = edge->offset - static_cast<double>(match.merged);
+  const auto fitBetween = [&](int from, int to) {
+    return fitProfile(grey.data() + (from - first), from, to - from + 1, blur,
+                      {static_cast<double>(match.before), static_cast<double>(match.after)});
+  };
+  auto edge = fitBetween(first, last);
+  if (!edge) return;
   match.noise = edge->noise;
+  // Texture beside the edge: less of it.
+  if (match.outline && edge->noise > kTexturedNoise) {
+    for (const auto& [from, to] : {std::pair(-kShortProfile, last), std::pair(first, kShortProfile),
+                                   std::pair(-kShortProfile, kShortProfile)}) {
+      if (from < first || to > last) continue;
+      const auto shorter = fitBetween(from, to);
+      if (shorter && shorter->noise < kShortShare * match.noise && shorter->variance < edge->variance)
+        edge = shorter;
+    }
+  }
+  if (std::abs(edge->offset) > kLargestShift) return;
+  match.offset = edge->offset - static_cast<double>(match.merged);
   match.variance = params_.edge_sigma * params_.edge_sigma + edge->variance +
                    std::pow(kRoundingDoubt * static_cast<double>(match.rounding), 2);
 }
