@@ -26,7 +26,7 @@ constexpr float kRegionPull = 1.0F;       // of the region on the choice between
 constexpr double kRegionWeight = 1.0;     // [px] beside an outline that speak independently
 constexpr double kLearningRate = 0.1;     // a frame
 constexpr double kMisfitWeight = 1.0;     // independent grey values of a profile
-constexpr double kOutlineSpread = 0.5, kCreaseSpread = 0.8;  // [px]
+constexpr double kOutlineSpread = 0.4, kCreaseSpread = 0.6;  // [px]
 // Against chance [nats]: an edge near an arbitrary place is seen about every third time, an outline
 // nearly always, a crease often not.
 constexpr double kMissedOutline = 1.5, kMissedCrease = 0.7;
