@@ -37,9 +37,9 @@ constexpr double kWorseFit = 1.25;        // times the residual of the frames be
 constexpr int kMoreHypotheses = 16;       // refined then
 constexpr int kSides = 6;                 // left out in turn then
 constexpr std::size_t kCandidates = 300;  // of the particles, to be refined
-constexpr double kCommonPixels = 0.1;     // [px] of calibration
+constexpr double kCommonPixels = 0.08;    // [px] of calibration
 constexpr double kCommonLines = 5;        // of the contour that err each for itself
-constexpr double kCommonShape = 8e-5;     // [m] of the object's shape
+constexpr double kCommonShape = 6e-5;    // [m] of the object's shape
 constexpr double kUnknownSpin = 0.25;     // [rad] of a free axis that nothing binds
 constexpr double kDoubtShare = 0.3;       // of the particles, drawn as if the last pose were wrong
 constexpr double kDoubtReach = 4;         // [px] by which it then lies off
@@ -78,6 +78,7 @@ constexpr double kFoundInside = 0.3;       // share of the contour inside the im
 constexpr double kCompelling = 160;        // [nats] of evidence that chance does not bring about
 constexpr double kCompelledSupport = 0.6;  // and what then is enough
 constexpr double kCompelledInside = 0.15;  // likewise
+constexpr double kClearEvidence = 80, kClearSupport = 0.75;  // the same, of a pose well supported
 constexpr double kSureSupport = 0.7;       // below it the search is asked for its opinion
 constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
 constexpr double kOpinionMargin = 20;                // [nats] by which another pose must be better
@@ -142,7 +143,7 @@ class Tracker::Impl {
     proven_ = true;  // somebody knows
     beginLooks(Appearance{}.bright_inside);
     report_.state = TrackerState::kTracking;
-    confirming_ = false;
+    confirming_ = on_probation_ = false;
     last_seen_.reset();
     remembered_.reset();
     last_stamp_.reset();
@@ -153,7 +154,7 @@ class Tracker::Impl {
     remembered_.reset();
     last_stamp_.reset();
     last_seen_.reset();
-    confirming_ = false;
+    confirming_ = on_probation_ = false;
   }
 
   void stop() {
@@ -188,9 +189,7 @@ class Tracker::Impl {
     Pose camera_motion = cameraMotion(fixed_from_camera);
     if (report_.state != TrackerState::kTracking && !confirming_) {
       lookFor(frame, camera_motion);
-      // Another body may look the same: one that was tracked before must prove itself.
-      const bool sure = (!remembered_ && report_.support >= kSureStart) || found_same_;
-      if (!confirming_ || !sure) return std::nullopt;
+      if (!confirming_ || !found_sure_) return std::nullopt;
       camera_motion.setIdentity();  // the pose is that of this frame
     }
     const auto begun = Clock::now();
@@ -262,7 +261,12 @@ class Tracker::Impl {
         last_seen_.reset(), report_.state = TrackerState::kSearching;
       return;
     }
-    found_same_ = sameAsLast(*found);
+    // Another body may look the same: one that was tracked before must be seen better, or in the
+    // same place.
+    found_sure_ = sameAsLast(*found) ||
+                  (report_.support >= kSureStart &&
+                   (!remembered_ || (found->evidence >= kCompelling &&
+                                     found->strength() >= kProvenStrength)));
     takeUp(known.value_or(asLastSeen(found->camera_from_object)), frame.stamp, known.has_value());
     beginLooks(std::clamp(found->bright_inside, 0.3, 0.9));
     search_.learn(belief_.pose, appearance_);
@@ -326,6 +330,7 @@ class Tracker::Impl {
     remembered_ = camera_motion * *remembered_;
     const PoseBelief belief = beliefAt(*remembered_, kRecallPositionSigma, kRecallRotationSigma);
     const std::optional<Pose> known = features_.recall(frame, regions(belief), belief.pose);
+    found_sure_ = false;
     if (known) takeUp(*known, frame.stamp, true);
     return known.has_value();
   }
@@ -704,7 +709,8 @@ class Tracker::Impl {
     Appearance plain = appearance_;
     plain.texture = nullptr;  // of the side that is taken for the seen one
     const auto better =
-        rivals_.look(belief_.pose, search_.turned(belief_.pose), measurement_, plain);
+        rivals_.look(belief_.pose, search_.turned(belief_.pose), measurement_, plain,
+                                      tracked_frames_ <= kFirstFrames);
     if (!better) return;
     const PoseBelief old = belief_;
     surface_.forget();
@@ -720,7 +726,9 @@ class Tracker::Impl {
     texture_support_ =
         features_.alone() ? 0 : surface_.support(measurement_.fields(), refined.camera_from_object);
     // What was never seen clearly since the start may be something else.
-    const bool compelling = refined.evidence >= kCompelling;
+    const bool compelling =
+        refined.evidence >= kCompelling ||
+        (refined.evidence >= kClearEvidence && report_.support >= kClearSupport);
     const double strength = features_.alone() || compelling ? kProvenStrength : refined.strength();
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
     const bool supported =
@@ -729,13 +737,17 @@ class Tracker::Impl {
         (report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
          texture_support_ >= kTextureSupport ||
          (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_));
-    if (confirming_) {
+    if (confirming_ || on_probation_) {
+      const bool again = on_probation_;
+      on_probation_ = confirming_ && found_sure_;
       confirming_ = false;
       frames_lost_ = 0;
       if ((report_.support < (compelling ? kCompelledSupport : kFoundSupport) ||
            strength < kLeastStrength) &&
-          landmark_support < kLandmarkSupport && !sameAsLast(refined))
+          landmark_support < kLandmarkSupport && !sameAsLast(refined)) {
+        if (again) report_.state = TrackerState::kLost;
         return;
+      }
     }
     if (supported) {
       leverage_ = refined.leverage;
@@ -793,7 +805,8 @@ class Tracker::Impl {
   bool fresh_ = false;
   bool proven_ = false;             ///< seen clearly since the start
   bool confirming_ = false;         ///< the last search found something
-  bool found_same_ = false;         ///< where the object was last
+  bool found_sure_ = false;         ///< and needs no other frame to be believed
+  bool on_probation_ = false;       ///< it was, and must prove itself in the next one
   std::optional<Pose> last_seen_;   ///< where the object was when the tracker stood by it
   std::optional<Pose> remembered_;  ///< the same, for as long as it takes
 };

@@ -16,9 +16,9 @@ constexpr double kApart = 0.25;       // [rad]
 constexpr double kHopeless = 80;      // [nats] by which others may be worse at first
 constexpr double kMostGain = 15;      // [nats] of contour or shading in one look
 // [nats], and this share of all, up to which a difference may be the same at every look.
-constexpr double kContourMargin = 15, kContourShare = 0.15;
+constexpr double kContourMargin = 15, kContourShare = 0.15, kYoungContourShare = 0.04;
 constexpr double kShadedMargin = 4, kShadedShare = 0.03;
-constexpr double kLead = 40;            // [nats] by which a rival must be better over all looks
+constexpr double kLead = 40, kYoungLead = 20;            // [nats] by which a rival must be better over all looks
 constexpr double kLeastSupport = 0.68;  // share of the contour that it must have
 
 /// What of a difference is clear.
@@ -87,7 +87,7 @@ std::vector<RefinedPose> TurnedRivals::likeliest(const Pose& pose, const std::ve
 
 std::optional<Pose> TurnedRivals::look(const Pose& pose, const std::vector<Pose>& turned,
                                        const ContourMeasurement& measurement,
-                                       const Appearance& appearance) {
+                                       const Appearance& appearance, bool young) {
   if (turned.empty()) return std::nullopt;
   std::vector<RefinedPose> compared = likeliest(pose, turned, measurement, appearance);
   double gain = -kMostGain;
@@ -101,7 +101,7 @@ std::optional<Pose> TurnedRivals::look(const Pose& pose, const std::vector<Pose>
     });
     const double own = compared.front().log_likelihood;
     for (std::size_t i = 1; i < compared.size(); ++i) {
-      double better = clear(compared[i].log_likelihood - own, own, kContourMargin, kContourShare) +
+      double better = clear(compared[i].log_likelihood - own, own, kContourMargin, young ? kYoungContourShare : kContourShare) +
                       clear(shaded[i] - shaded[0], shaded[0], kShadedMargin, kShadedShare);
       if (compared[i].support() < kLeastSupport) better = std::min(better, 0.0);
       if (better < gain) continue;
@@ -115,7 +115,7 @@ std::optional<Pose> TurnedRivals::look(const Pose& pose, const std::vector<Pose>
     rival_ = turn;
   }
   lead_ = std::max(0.0, lead_ + gain);
-  if (lead_ < kLead) return std::nullopt;
+  if (lead_ < (young ? kYoungLead : kLead)) return std::nullopt;
   forget();
   return compared[best].camera_from_object;
 }

@@ -25,9 +25,11 @@ class TurnedRivals {
 
   /// One look at the last frame.
   /// @param turned poses at the place of `pose` in which the object looks nearly the same
+  /// @param young whether the pose stands since few frames only, on hardly more than one look
   /// @return the pose to take instead, refined; nothing while `pose` stands
   std::optional<Pose> look(const Pose& pose, const std::vector<Pose>& turned,
-                           const ContourMeasurement& measurement, const Appearance& appearance);
+                           const ContourMeasurement& measurement, const Appearance& appearance,
+                           bool young);
 
  private:
   std::vector<RefinedPose> likeliest(const Pose& pose, const std::vector<Pose>& turned,
