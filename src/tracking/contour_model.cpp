@@ -8,6 +8,7 @@
 
 #include "contour_segments.hpp"
 #include "mesh_views.hpp"
+#include "rounded_edge.hpp"
 
 namespace leap_object_tracker {
 
@@ -22,17 +23,6 @@ class ContourModel::Table {
 };
 
 namespace {
-
-/// From a sharp edge to where its outline lies, on average over the views, when the edge is
-/// rounded. With h half the angle between the normals, the outline lies inside of the sharp one by
-/// radius * (cos(a) / cos(h) - 1), a within +-h of the bisector; its mean is radius * (tan(h) / h -
-/// 1).
-Eigen::Vector3d roundedEdgeShift(const Eigen::Vector3d& normal_a, const Eigen::Vector3d& normal_b,
-                                 double radius) {
-  const double h = 0.5 * std::acos(std::clamp(normal_a.dot(normal_b), -1.0, 1.0));
-  if (h < 0.05) return Eigen::Vector3d::Zero();
-  return -(normal_a + normal_b).normalized() * (radius * (std::tan(h) - h) / std::sin(h));
-}
 
 /// One view for each set of visible faces of a convex polyhedron.
 class PolyhedronTable : public ContourModel::Table {
@@ -95,7 +85,7 @@ class PolyhedronTable : public ContourModel::Table {
         sides[side] = faceOf(normals[side], normals[side].dot(start));
       }
       if (sides[0] == sides[1]) continue;
-      const Eigen::Vector3d shift = roundedEdgeShift(normals[0], normals[1], edge_radius);
+      const Eigen::Vector3d shift = roundedOutlineShift(normals[0], normals[1], edge_radius);
       edges.push_back({start + shift, end + shift, sides});
     }
     return edges;
@@ -225,7 +215,7 @@ class CylinderTable : public ContourModel::Table {
   static void addRim(double full_radius, double height, double edge_radius, int end,
                      const Judge& judge, std::vector<ContourSegment>& all) {
     const Eigen::Vector3d shift =
-        roundedEdgeShift(Eigen::Vector3d::UnitX(), end * Eigen::Vector3d::UnitZ(), edge_radius);
+        roundedOutlineShift(Eigen::Vector3d::UnitX(), end * Eigen::Vector3d::UnitZ(), edge_radius);
     const double radius = full_radius + shift.x(), z = end * height / 2 + shift.z();
     const auto at = [&](double angle) {
       return Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), z);

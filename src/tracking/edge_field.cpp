@@ -57,8 +57,8 @@ float plainDeviation(const cv::Mat& image, EdgeDetector& detector) {
       detector.differentiate(image(patch), varianceStabilizer().ptr<std::uint8_t>());
       deviations[count++] = std::max(meanDeviation(detector.du()), meanDeviation(detector.dv()));
     }
-  const auto plain = deviations.begin() +
-                     static_cast<std::ptrdiff_t>(kPlainShare * static_cast<double>(count));
+  const auto plain =
+      deviations.begin() + static_cast<std::ptrdiff_t>(kPlainShare * static_cast<double>(count));
   std::nth_element(deviations.begin(), plain, deviations.end());
   return *plain;
 }
@@ -99,8 +99,8 @@ void EdgeField::build(const cv::Mat& image, const cv::Rect& region) {
   detector_.differentiate(image_, varianceStabilizer().ptr<std::uint8_t>());
 
   constexpr float kWeakest = 20;  // a step of 5 grey levels of 255 after smoothing
-  const float noise =
-      std::min(kNoisier * plain, std::max(robustDeviation(detector_.du()), robustDeviation(detector_.dv())));
+  const float noise = std::min(
+      kNoisier * plain, std::max(robustDeviation(detector_.du()), robustDeviation(detector_.dv())));
   // A Sobel response is 8 slopes; back from the stabilised scale by its derivative.
   const auto slope_noise =
       static_cast<float>(std::max(kLeastNoise, static_cast<double>(noise)) / 8 / kStabilizedScale);

@@ -11,6 +11,7 @@
 #include "leap_optics.hpp"
 #include "limb_shift.hpp"
 #include "line_neighbours.hpp"
+#include "rounded_edge.hpp"
 #include "sampler.hpp"
 
 namespace leap_object_tracker {
@@ -57,8 +58,7 @@ constexpr double kHiddenCost = 0.5;  // [nats] against each independent sample o
 // [px] by how much the rounding and the gloss of an edge between two visible faces may move its
 // image.
 constexpr double kCreaseDoubt = 1.2;
-constexpr float kMostRounding = 4;      // radii by which the rounding of a crease moves its image
-constexpr double kRoundingDoubt = 0.5;  // of that
+constexpr double kRoundingDoubt = 0.5;  // of what is made up for of it
 // Edges along one line share their errors: this share of the information of independent ones is
 // left.
 constexpr double kIndependentErrors = 0.4;
@@ -120,32 +120,6 @@ static float expectedStep(const ContourPoint& point, const Eigen::Vector3f& to_l
   if (point.limb > 0) return -kLimb;
   if (point.outline()) return -std::max(kLeastOutline, brightness(0) + brightness(1));
   return brightness(0) - brightness(1);
-}
-
-/// [m] by which the image of a crease lies off it, in the object frame: its rounding is brighter
-/// than both faces where it is turned to the light. A circle of this radius touches the faces; with
-/// their normals at the angles a and b from the light, the steep part of the blurred image lies where
-/// a sharp step would leave as much light:
-///   (cos a - cos b) x = radius * (b - a - sin b cos b + sin a cos a) / 2, from the circle's centre.
-/// A model's line lies at roundedEdgeShift() from the sharp edge (contour_model.cpp).
-static Eigen::Vector3f roundingShift(const ContourPoint& point, const Eigen::Vector3f& to_light,
-                                     float radius) {
-  const Eigen::Vector3f &a = point.faces[0], &b = point.faces[1];
-  if (point.outline() || a.isZero() || b.isZero()) return Eigen::Vector3f::Zero();
-  Eigen::Vector3f across = point.tangent.cross(to_light).normalized();
-  if (across.dot(b - a) < 0) across = -across;
-  const Eigen::Vector3f light = across.cross(point.tangent).normalized();
-  const float sign = light.dot(to_light) < 0 ? -1.0F : 1.0F;
-  const float cos_a = sign * light.dot(a), cos_b = sign * light.dot(b);
-  const float sin_a = across.dot(a), sin_b = across.dot(b);
-  const float half = 0.5F * std::acos(std::clamp(a.dot(b), -1.0F, 1.0F));
-  if (half < 0.05F) return Eigen::Vector3f::Zero();
-  const float from_centre = 1 / std::cos(half) - (std::tan(half) - half) / std::sin(half);
-  const float line = from_centre * (sin_a + sin_b) / (2 * std::cos(half));
-  const float step = cos_a - cos_b;
-  const float excess = half + 0.5F * (sin_a * cos_a - sin_b * cos_b) - line * step;
-  const float least = excess / kMostRounding;
-  return radius * excess * step / std::max(step * step, least * least) * across;
 }
 
 /// One contour point that was looked for in one eye.
@@ -291,11 +265,12 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         match.place -= static_cast<float>(shift) * normal.cast<float>();
       }
       match.normal = normal.cast<float>();
-      if (params_.edge_radius > 0 && !match.outline) {
-        const Eigen::Vector3d shift =
-            rotation *
-            roundingShift(point, to_light, static_cast<float>(params_.edge_radius)).cast<double>();
-        match.rounding = static_cast<float>(row.dot(shift));
+      if (params_.edge_radius > 0 && !point.outline() && !point.faces[0].isZero() &&
+          !point.faces[1].isZero()) {
+        const Eigen::Vector3f shift =
+            roundedCreaseShift(point.faces[0], point.faces[1], point.tangent, to_light,
+                               static_cast<float>(params_.edge_radius));
+        match.rounding = static_cast<float>(row.dot(rotation * shift.cast<double>()));
         match.place += match.rounding * match.normal;
       }
       matches.push_back(match);
@@ -476,7 +451,8 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
                                    std::pair(-kShortProfile, kShortProfile)}) {
       if (from < first || to > last) continue;
       const auto shorter = fitBetween(from, to);
-      if (shorter && shorter->noise < kShortShare * match.noise && shorter->variance < edge->variance)
+      if (shorter && shorter->noise < kShortShare * match.noise &&
+          shorter->variance < edge->variance)
         edge = shorter;
     }
   }

@@ -39,7 +39,7 @@ constexpr int kSides = 6;                 // left out in turn then
 constexpr std::size_t kCandidates = 300;  // of the particles, to be refined
 constexpr double kCommonPixels = 0.08;    // [px] of calibration
 constexpr double kCommonLines = 5;        // of the contour that err each for itself
-constexpr double kCommonShape = 6e-5;    // [m] of the object's shape
+constexpr double kCommonShape = 6e-5;     // [m] of the object's shape
 constexpr double kUnknownSpin = 0.25;     // [rad] of a free axis that nothing binds
 constexpr double kDoubtShare = 0.3;       // of the particles, drawn as if the last pose were wrong
 constexpr double kDoubtReach = 4;         // [px] by which it then lies off
@@ -61,14 +61,15 @@ constexpr double kTextureLearningSupport = 0.78;  // of a pose at which texture 
 // Of the covariance of the contour alone: what is left after so many frames of learning, of errors
 // that are much alike from frame to frame.
 constexpr double kLearnedError = 0.4;
-constexpr int kSettled = 4;              // such frames after a start before it is
-constexpr double kExact = 0.5;           // [px]
-constexpr double kNothingLeft = 0.15;    // support at which the object is lost at once
-constexpr int kPatience = 3;             // frames below it before the object counts as lost
-constexpr double kFoundSupport = 0.68;   // share of the contour that a found pose must have
-constexpr double kSureStart = 0.80;      // support that needs no other frame to prove itself
-constexpr double kRefoundSupport = 0.6;  // the same, close to where the object was last
-constexpr double kRefoundReach = 0.03;   // [m]
+constexpr int kSettled = 4;               // such frames after a start before it is
+constexpr double kExact = 0.5;            // [px]
+constexpr double kUnbrokenSupport = 0.9;  // of a track that missing landmarks do not end
+constexpr double kNothingLeft = 0.15;     // support at which the object is lost at once
+constexpr int kPatience = 3;              // frames below it before the object counts as lost
+constexpr double kFoundSupport = 0.68;    // share of the contour that a found pose must have
+constexpr double kSureStart = 0.80;       // support that needs no other frame to prove itself
+constexpr double kRefoundSupport = 0.6;   // the same, close to where the object was last
+constexpr double kRefoundReach = 0.03;    // [m]
 // Less is enough where the object was a moment ago, and nobody else looks like it there.
 constexpr double kSameReach = 0.015, kSameTurn = 0.35;  // [m], [rad]
 constexpr double kSameSupport = 0.48, kSameStrength = 0.12;
@@ -79,7 +80,7 @@ constexpr double kCompelling = 160;        // [nats] of evidence that chance doe
 constexpr double kCompelledSupport = 0.6;  // and what then is enough
 constexpr double kCompelledInside = 0.15;  // likewise
 constexpr double kClearEvidence = 80, kClearSupport = 0.75;  // the same, of a pose well supported
-constexpr double kSureSupport = 0.7;       // below it the search is asked for its opinion
+constexpr double kSureSupport = 0.7;                 // below it the search is asked for its opinion
 constexpr int kFirstOpinion = 6, kLastOpinion = 96;  // [frames] between two of them
 constexpr double kOpinionMargin = 20;                // [nats] by which another pose must be better
 constexpr double kOpinionSupport = 0.15;             // and have more support
@@ -263,10 +264,12 @@ class Tracker::Impl {
     }
     // Another body may look the same: one that was tracked before must be seen better, or in the
     // same place.
-    found_sure_ = sameAsLast(*found) ||
-                  (report_.support >= kSureStart &&
-                   (!remembered_ || (found->evidence >= kCompelling &&
-                                     found->strength() >= kProvenStrength)));
+    const bool same = sameAsLast(*found), first = !remembered_;
+    found_sure_ =
+        same ||
+        (report_.support >= kSureStart &&
+         (first || (found->evidence >= kCompelling && found->strength() >= kProvenStrength)));
+    on_probation_ = found_sure_ && !same && !first;
     takeUp(known.value_or(asLastSeen(found->camera_from_object)), frame.stamp, known.has_value());
     beginLooks(std::clamp(found->bright_inside, 0.3, 0.9));
     search_.learn(belief_.pose, appearance_);
@@ -330,7 +333,7 @@ class Tracker::Impl {
     remembered_ = camera_motion * *remembered_;
     const PoseBelief belief = beliefAt(*remembered_, kRecallPositionSigma, kRecallRotationSigma);
     const std::optional<Pose> known = features_.recall(frame, regions(belief), belief.pose);
-    found_sure_ = false;
+    found_sure_ = on_probation_ = false;
     if (known) takeUp(*known, frame.stamp, true);
     return known.has_value();
   }
@@ -708,9 +711,8 @@ class Tracker::Impl {
       return;
     Appearance plain = appearance_;
     plain.texture = nullptr;  // of the side that is taken for the seen one
-    const auto better =
-        rivals_.look(belief_.pose, search_.turned(belief_.pose), measurement_, plain,
-                                      tracked_frames_ <= kFirstFrames);
+    const auto better = rivals_.look(belief_.pose, search_.turned(belief_.pose), measurement_,
+                                     plain, tracked_frames_ <= kFirstFrames);
     if (!better) return;
     const PoseBelief old = belief_;
     surface_.forget();
@@ -731,15 +733,18 @@ class Tracker::Impl {
         (refined.evidence >= kClearEvidence && report_.support >= kClearSupport);
     const double strength = features_.alone() || compelling ? kProvenStrength : refined.strength();
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
+    // No other body takes the place of one whose contour is all there from frame to frame.
+    const bool unbroken =
+        !confirming_ && !on_probation_ && weak_frames_ == 0 && report_.support >= kUnbrokenSupport;
     const bool supported =
         (proven_ || strength >= kLeastStrength || (confirming_ && sameAsLast(refined))) &&
-        !features_.contradict(refined.camera_from_object, refined.bestEyeSupport()) &&
+        (unbroken || !features_.contradict(refined.camera_from_object, refined.bestEyeSupport())) &&
         (report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
          texture_support_ >= kTextureSupport ||
          (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_));
     if (confirming_ || on_probation_) {
-      const bool again = on_probation_;
-      on_probation_ = confirming_ && found_sure_;
+      const bool again = !confirming_;
+      if (again) on_probation_ = false;
       confirming_ = false;
       frames_lost_ = 0;
       if ((report_.support < (compelling ? kCompelledSupport : kFoundSupport) ||

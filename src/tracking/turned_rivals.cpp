@@ -18,7 +18,8 @@ constexpr double kMostGain = 15;      // [nats] of contour or shading in one loo
 // [nats], and this share of all, up to which a difference may be the same at every look.
 constexpr double kContourMargin = 15, kContourShare = 0.15, kYoungContourShare = 0.04;
 constexpr double kShadedMargin = 4, kShadedShare = 0.03;
-constexpr double kLead = 40, kYoungLead = 20;            // [nats] by which a rival must be better over all looks
+constexpr double kLead = 40,
+                 kYoungLead = 20;       // [nats] by which a rival must be better over all looks
 constexpr double kLeastSupport = 0.68;  // share of the contour that it must have
 
 /// What of a difference is clear.
@@ -101,7 +102,8 @@ std::optional<Pose> TurnedRivals::look(const Pose& pose, const std::vector<Pose>
     });
     const double own = compared.front().log_likelihood;
     for (std::size_t i = 1; i < compared.size(); ++i) {
-      double better = clear(compared[i].log_likelihood - own, own, kContourMargin, young ? kYoungContourShare : kContourShare) +
+      double better = clear(compared[i].log_likelihood - own, own, kContourMargin,
+                            young ? kYoungContourShare : kContourShare) +
                       clear(shaded[i] - shaded[0], shaded[0], kShadedMargin, kShadedShare);
       if (compared[i].support() < kLeastSupport) better = std::min(better, 0.0);
       if (better < gain) continue;

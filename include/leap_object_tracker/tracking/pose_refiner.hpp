@@ -47,7 +47,7 @@ struct RefinedPose {
   Matrix6d leverage = Matrix6d::Zero();
   std::array<EyeSupport, 2> eyes;
   std::optional<int> hidden_eye;  ///< from which something seems to hide the object
-  double residual = 0;  ///< [px] robust standard deviation of the edges about the contour
+  double residual = 0;            ///< [px] robust standard deviation of the edges about the contour
   double bright_inside =
       0;  ///< share of supported outline on whose inner side the image is brighter
   double log_likelihood = 0;  ///< sum over independent samples of the gain against chance [nats]

@@ -120,14 +120,15 @@ class Rivals : public Shaded {
   }
 
   /// Looks at the drawn truth, at most so often, until a pose is to be taken.
-  std::optional<Pose> lookAt(const Pose& own, const Pose& other, int looks, int& needed) {
+  std::optional<Pose> lookAt(const Pose& own, const Pose& other, int looks, int& needed,
+                             bool young = false) {
     ContourMeasurement measurement(ContourParams(), Eyes::kBoth, camera_);
     const cv::Rect whole(cv::Point(), camera_.size);
     measurement.observe(castFrame(object_.mesh, truth_, camera_), {whole, whole});
     const ShadedView shaded_view(object_.mesh, camera_);
     TurnedRivals rivals(object_.symmetry, model_, refiner_, shaded_view, camera_.baseline);
     for (needed = 1; needed <= looks; ++needed)
-      if (const auto better = rivals.look(own, {other}, measurement, {})) return better;
+      if (const auto better = rivals.look(own, {other}, measurement, {}, young)) return better;
     return std::nullopt;
   }
 
@@ -151,9 +152,17 @@ TEST_F(Rivals, takeThePlaceOfAFlippedPoseAfterAFewLooks) {
   EXPECT_LT((better->translation() - truth_.translation()).norm(), 0.001);
 }
 
+TEST_F(Rivals, takeThePlaceOfAYoungPoseSooner) {
+  int late = 0, soon = 0;
+  ASSERT_TRUE(lookAt(flipped_, truth_, 10, late));
+  ASSERT_TRUE(lookAt(flipped_, truth_, 10, soon, true));
+  EXPECT_LT(soon, late);
+}
+
 TEST_F(Rivals, leaveTheTruePoseAlone) {
   int needed = 0;
   EXPECT_FALSE(lookAt(truth_, flipped_, 20, needed));
+  EXPECT_FALSE(lookAt(truth_, flipped_, 20, needed, true));
 }
 
 }  // namespace

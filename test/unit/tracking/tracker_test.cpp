@@ -102,6 +102,45 @@ TEST_F(MovingBox, isGivenUpWhenItIsGoneAndFoundAgain) {
   EXPECT_LT(positionError(*estimate, frame - 1), 0.002);
 }
 
+TEST_F(MovingBox, isFoundAtOnceWhereItWasThoughMuchOfItIsCovered) {
+  Tracker tracker(TrackerParams(), object_, camera_);
+  tracker.start(truthAt(0));
+  const auto shown = [&](int frame, bool covered) {
+    RectifiedStereoFrame still = frameAt(0);
+    still.stamp = stampFromSeconds(1 + frame * kPeriod);
+    const double middle = camera_.leftPixel(truthAt(0).translation()).x();
+    if (covered) {
+      still.left.colRange(0, static_cast<int>(middle) - 9).setTo(4);
+      const double disparity =
+          camera_.focal_length * camera_.baseline / truthAt(0).translation().z();
+      still.right.colRange(0, static_cast<int>(middle - disparity) - 9).setTo(4);
+    }
+    return still;
+  };
+  int frame = 0;
+  for (; frame < 5; ++frame) ASSERT_TRUE(tracker.track(shown(frame, false)));
+  for (int gone = 0; gone < 6; ++gone, ++frame) tracker.track(darkAt(frame));
+  ASSERT_EQ(tracker.report().state, TrackerState::kLost);
+  const auto estimate = tracker.track(shown(frame, true));
+  ASSERT_TRUE(estimate);
+  EXPECT_LT(estimate->support, 0.6);
+  EXPECT_LT(positionError(*estimate, 0), 0.001);
+}
+
+TEST_F(MovingBox, isFollowedByTheEyeThatSeesMostOfIt) {
+  Tracker tracker(TrackerParams(), object_, camera_);
+  tracker.start(truthAt(0));
+  std::optional<PoseEstimate> estimate;
+  for (int frame = 0; frame < 30; ++frame) {
+    RectifiedStereoFrame seen = frameAt(frame);
+    if (frame >= 5) seen.right.setTo(4);
+    estimate = tracker.track(seen);
+    ASSERT_TRUE(estimate) << frame;
+    EXPECT_GT(estimate->support, 0.8) << frame;
+    EXPECT_LT(positionError(*estimate, frame), 0.005) << frame;
+  }
+}
+
 TEST_F(MovingBox, thatIsElsewhereThanWhatIsFollowedIsTakenUpInstead) {
   Tracker tracker(TrackerParams(), object_, camera_);
   // A quarter of the contour is not there: the pose is followed, but not for sure.
