@@ -36,11 +36,12 @@ struct FilterParams {
 
 /// The contour likelihood.
 struct ContourParams {
-  int points = 96;              ///< contour points scored a particle and eye
-  double truncation = 8.0;      ///< [px] edges farther away count as no edge
-  double outlier_share = 0.3;   ///< prior share of contour points that no edge supports
-  double edge_sigma = 0.4;      ///< [px] noise of one sub-pixel edge
-  double edge_radius = 0.0002;  ///< [m] rounding of the edges of a primitive: no body is sharp
+  int points = 96;             ///< contour points scored a particle and eye
+  double truncation = 8.0;     ///< [px] edges farther away count as no edge
+  double outlier_share = 0.3;  ///< prior share of contour points that no edge supports
+  double edge_sigma = 0.4;     ///< [px] noise of one sub-pixel edge
+  double edge_radius =
+      0.0002;  ///< [m] rounding of edges (of a mesh: of its creases); none is sharp
   /// How a curved body, lit from beside the camera, darkens where it turns away: 1 as a matt one
   /// does (Lambert), whose limb then shows inside of its true place; 0 not at all.
   double limb_darkening = 1;
