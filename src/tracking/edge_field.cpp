@@ -95,12 +95,13 @@ void EdgeField::build(const cv::Mat& image, const cv::Rect& region) {
   image_ = image(region_);
   detector_.smooth(image_, 16, smooth_memory_);
   smooth_ = cv::Mat(image_.size(), CV_16SC1, smooth_memory_.row(0));
-  const float plain = plainDeviation(image, detector_);
   detector_.differentiate(image_, varianceStabilizer().ptr<std::uint8_t>());
 
   constexpr float kWeakest = 20;  // a step of 5 grey levels of 255 after smoothing
-  const float noise = std::min(
-      kNoisier * plain, std::max(robustDeviation(detector_.du()), robustDeviation(detector_.dv())));
+  static_assert(kWeakest >= 5 * kLeastNoise, "less than the least noise changes nothing");
+  float noise = std::max(robustDeviation(detector_.du()), robustDeviation(detector_.dv()));
+  if (noise > kLeastNoise)
+    noise = std::min(noise, kNoisier * plainDeviation(image, patch_detector_));
   // A Sobel response is 8 slopes; back from the stabilised scale by its derivative.
   const auto slope_noise =
       static_cast<float>(std::max(kLeastNoise, static_cast<double>(noise)) / 8 / kStabilizedScale);

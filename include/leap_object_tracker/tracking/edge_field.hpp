@@ -76,7 +76,7 @@ class EdgeField {
   cv::Size image_size_;
   cv::Mat image_, smooth_;
   ImageMemory<std::int16_t> smooth_memory_;
-  EdgeDetector detector_;
+  EdgeDetector detector_, patch_detector_;
   std::vector<Edgel> edgels_;
   std::array<float, 256> slope_noise_{};
 };
