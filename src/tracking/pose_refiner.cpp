@@ -528,7 +528,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   const std::optional<int> hidden = result.hidden_eye = ignoreHiddenEye(matches);
   const double deviation = robustScale(last_range);
   result.residual = deviation;
-  double bright = 0, judged = 0, found = 0;
+  double bright = 0, judged = 0, found = 0, squares = 0;
   const std::array<double, 2> typical = brightnessInside(matches);
   for (const Match& m : matches) {
     if (hidden == m.eye) {
@@ -548,9 +548,10 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     double gain = -missed;
     if (m.found) {
       const double weight = tukeyWeight(m.offset, 4.685 * std::max(deviation, params_.edge_sigma));
-      result.information.noalias() += kIndependentErrors * weight * m.samples / m.variance *
-                                      m.jacobian * m.jacobian.transpose();
+      result.contour_information.noalias() += kIndependentErrors * weight * m.samples / m.variance *
+                                              m.jacobian * m.jacobian.transpose();
       found += weight * m.samples;
+      squares += weight * m.samples * m.offset * m.offset / m.variance;
       result.leverage.noalias() += weight * m.samples * m.jacobian * m.jacobian.transpose();
       if (m.outline && std::abs(m.offset) < kSupportDistance) {
         judged += m.length;
@@ -562,7 +563,10 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     result.log_likelihood +=
         m.samples * gain + kRegionWeight * m.expected * m.samples * static_cast<double>(m.region);
   }
-  if (found > 0) result.leverage /= found;
+  if (found > 0) {
+    result.leverage /= found;
+    result.scatter = squares / found;
+  }
   result.evidence = result.log_likelihood;
   // Lines that the model lacks or has too many spoil the fits; points without a fit do not count.
   // It is the outline that weighs them: poses that show more creases are not worse for it.
@@ -577,7 +581,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   result.log_likelihood -= result.misfit;
   const SurfaceEvidence texture = evidenceOf(appearance.texture, fields, pose);
   result.texture_information = texture.information;
-  result.information += texture.information;
+  result.information = result.contour_information + texture.information;
   result.log_likelihood += texture.log_likelihood;
   result.bright_inside = judged > 0 ? bright / judged : 0.5;
   return result;

@@ -37,16 +37,21 @@ constexpr double kWorseFit = 1.25;        // times the residual of the frames be
 constexpr int kMoreHypotheses = 16;       // refined then
 constexpr int kSides = 6;                 // left out in turn then
 constexpr std::size_t kCandidates = 300;  // of the particles, to be refined
-constexpr double kCommonPixels = 0.08;    // [px] of calibration
+constexpr double kCommonPixels = 0.06;    // [px] of calibration
 constexpr double kCommonLines = 5;        // of the contour that err each for itself
-constexpr double kCommonShape = 6e-5;     // [m] of the object's shape
-constexpr double kUnknownSpin = 0.25;     // [rad] of a free axis that nothing binds
-constexpr double kDoubtShare = 0.3;       // of the particles, drawn as if the last pose were wrong
-constexpr double kDoubtReach = 4;         // [px] by which it then lies off
-constexpr double kLeastTurn = 0.15;       // [rad] of a least bound direction that is doubtful
-constexpr double kFarthestTurn = 0.4;     // [rad] of one that nothing binds
-constexpr double kClearlyBetter = 8;      // [nats] by which such a pose must be better
-constexpr double kDoubtCost = 5;          // [nats] against a pose that says so
+constexpr double kCommonShape = 4.5e-5;   // [m] of the object's shape
+// RefinedPose::scatter of poses that err as their information says. It is not 1, as lines share
+// errors that the fit takes up and no residual shows.
+constexpr double kUsualScatter = 0.4;
+constexpr double kLeastScatter = 0.1, kMostScatter = 5;  // of it
+constexpr double kScatterRate = 0.1;                     // a frame
+constexpr double kUnknownSpin = 0.25;                    // [rad] of a free axis that nothing binds
+constexpr double kDoubtShare = 0.3;     // of the particles, drawn as if the last pose were wrong
+constexpr double kDoubtReach = 4;       // [px] by which it then lies off
+constexpr double kLeastTurn = 0.15;     // [rad] of a least bound direction that is doubtful
+constexpr double kFarthestTurn = 0.4;   // [rad] of one that nothing binds
+constexpr double kClearlyBetter = 8;    // [nats] by which such a pose must be better
+constexpr double kDoubtCost = 5;        // [nats] against a pose that says so
 constexpr double kNearMisfit = 0.3;     // of RefinedPose::misfit, between poses close to each other
 constexpr double kMirroredMargin = 2;   // [nats] by which a mirrored pose must be better
 constexpr double kLeastSupport = 0.40;  // share of the contour to stand by a pose
@@ -354,6 +359,7 @@ class Tracker::Impl {
     learned_frames_ = 0;
     texture_support_ = 0;
     usual_residual_ = 0;
+    scatter_ = 1;
     frames_to_opinion_ = opinion_period_ = kFirstOpinion;
     weak_frames_ = 0;
     leverage_.setZero();
@@ -428,7 +434,8 @@ class Tracker::Impl {
   }
 
   Matrix6d covarianceToReport() const {
-    Matrix6d covariance = belief_.poseCovariance() + common(belief_.pose) + learned_error_;
+    Matrix6d covariance =
+        std::min(1.0, scatter_) * belief_.poseCovariance() + common(belief_.pose) + learned_error_;
     if (!object_.symmetry.hasFreeAxis()) return covariance;
     const Eigen::Vector3d axis = belief_.pose.linear() * object_.symmetry.free_axis;
     const double spin = axis.dot(covariance.bottomRightCorner<3, 3>() * axis);
@@ -473,7 +480,7 @@ class Tracker::Impl {
     if (refined.texture_information.isZero()) return Matrix6d::Zero();
     Twist most;
     most << Eigen::Vector3d::Constant(0.005), Eigen::Vector3d::Constant(0.1);
-    Matrix6d contour = refined.information - refined.texture_information;
+    Matrix6d contour = refined.contour_information;
     contour.diagonal() += most.cwiseAbs2().cwiseInverse();
     if (object_.symmetry.hasFreeAxis()) contour += 1e6 * freeSpin(refined.camera_from_object);
     return kLearnedError * contour.inverse();
@@ -682,6 +689,12 @@ class Tracker::Impl {
     return best;
   }
 
+  void learnScatter(double scatter) {
+    if (scatter <= 0) return;  // points alone
+    const double share = std::clamp(scatter / kUsualScatter, kLeastScatter, kMostScatter);
+    scatter_ += (fresh_ ? 1 : kScatterRate) * (share - scatter_);
+  }
+
   /// The pose of features and prediction; of two starts the one that explains both best.
   RefinedPose refineByFeatures() const {
     const PosePrior prior{belief_.pose, belief_.poseCovariance().inverse()};
@@ -756,8 +769,11 @@ class Tracker::Impl {
     }
     if (supported) {
       leverage_ = refined.leverage;
+      learnScatter(refined.scatter);
       learned_error_ = errorOfLearning(refined);
-      belief_.update(refined.camera_from_object, refined.information);
+      belief_.update(
+          refined.camera_from_object,
+          refined.information + (1 / std::max(1.0, scatter_) - 1) * refined.contour_information);
       usual_residual_ = usual_residual_ > 0
                             ? usual_residual_ + 0.1 * (refined.residual - usual_residual_)
                             : refined.residual;
@@ -800,7 +816,8 @@ class Tracker::Impl {
   Appearance appearance_;
   std::vector<std::uint32_t> order_;  ///< of the particles, the best ones first
   int weak_frames_ = 0;
-  double usual_residual_ = 0;                  ///< [px]
+  double usual_residual_ = 0;  ///< [px]
+  double scatter_ = 1;         ///< RefinedPose::scatter of the frames before, over the usual one
   Matrix6d leverage_ = Matrix6d::Zero();       ///< of the last supported pose
   Matrix6d learned_error_ = Matrix6d::Zero();  ///< likewise
   int frames_to_opinion_ = kFirstOpinion, opinion_period_ = kFirstOpinion;

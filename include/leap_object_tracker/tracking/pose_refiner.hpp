@@ -41,13 +41,18 @@ struct EyeSupport {
 struct RefinedPose {
   Pose camera_from_object = Pose::Identity();
   Matrix6d information = Matrix6d::Zero();          ///< of the image alone, of the camera twist
-  Matrix6d texture_information = Matrix6d::Zero();  ///< the share of it that texture gives
+  Matrix6d contour_information = Matrix6d::Zero();  ///< the share of it that the contour gives
+  Matrix6d texture_information = Matrix6d::Zero();  ///< and texture
   /// Mean over the contour that was found of the squared Jacobian of its place across it [px^2], by
   /// the camera twist: how far the contour moves with the pose, whatever the noise.
   Matrix6d leverage = Matrix6d::Zero();
   std::array<EyeSupport, 2> eyes;
   std::optional<int> hidden_eye;  ///< from which something seems to hide the object
   double residual = 0;            ///< [px] robust standard deviation of the edges about the contour
+  /// Mean square of the edges' distances from the contour, each over the variance that it was
+  /// expected to have: the variance of unit weight (Foerstner and Wrobel 2016, sec. 4.2.3) of the
+  /// information, but for the few degrees of freedom.
+  double scatter = 0;
   double bright_inside =
       0;  ///< share of supported outline on whose inner side the image is brighter
   double log_likelihood = 0;  ///< sum over independent samples of the gain against chance [nats]

@@ -214,6 +214,22 @@ TEST_F(MovingBox, isTrackedByOneEyeWithLessKnownDepth) {
   EXPECT_GT(by_left->covariance(2, 2), by_both->covariance(2, 2));
 }
 
+TEST_F(MovingBox, isLessKnownWhereItsEdgesScatter) {
+  const ObjectModel other = box(0.0315, 0.039, 0.051);
+  const auto covarianceOf = [&](const ObjectModel& drawn) {
+    Tracker tracker(TrackerParams(), object_, camera_);
+    tracker.start(truthAt(0));
+    std::optional<PoseEstimate> estimate;
+    for (int frame = 0; frame < 10; ++frame)
+      estimate = tracker.track(drawnFrame(drawn, truthAt(frame), camera_, 1 + frame * kPeriod));
+    return estimate ? estimate->covariance : Matrix6d(Matrix6d::Zero());
+  };
+  const Matrix6d alike = covarianceOf(object_), scattered = covarianceOf(other);
+  ASSERT_GT(alike(0, 0), 0);
+  EXPECT_GT(scattered(0, 0), 2 * alike(0, 0));
+  EXPECT_GT(scattered(2, 2), 2 * alike(2, 2));
+}
+
 TEST_F(MovingBox, restsInTheFixedFrameWhileTheCameraMoves) {
   TrackerParams params;
   Tracker tracker(params, object_, camera_);
