@@ -548,8 +548,8 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     double gain = -missed;
     if (m.found) {
       const double weight = tukeyWeight(m.offset, 4.685 * std::max(deviation, params_.edge_sigma));
-      result.contour_information.noalias() += kIndependentErrors * weight * m.samples / m.variance *
-                                              m.jacobian * m.jacobian.transpose();
+      result.information.noalias() += kIndependentErrors * weight * m.samples / m.variance *
+                                      m.jacobian * m.jacobian.transpose();
       found += weight * m.samples;
       squares += weight * m.samples * m.offset * m.offset / m.variance;
       result.leverage.noalias() += weight * m.samples * m.jacobian * m.jacobian.transpose();
@@ -581,7 +581,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   result.log_likelihood -= result.misfit;
   const SurfaceEvidence texture = evidenceOf(appearance.texture, fields, pose);
   result.texture_information = texture.information;
-  result.information = result.contour_information + texture.information;
+  result.information += texture.information;
   result.log_likelihood += texture.log_likelihood;
   result.bright_inside = judged > 0 ? bright / judged : 0.5;
   return result;

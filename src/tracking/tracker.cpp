@@ -435,7 +435,7 @@ class Tracker::Impl {
 
   Matrix6d covarianceToReport() const {
     Matrix6d covariance =
-        std::min(1.0, scatter_) * belief_.poseCovariance() + common(belief_.pose) + learned_error_;
+        scatter_ * belief_.poseCovariance() + common(belief_.pose) + learned_error_;
     if (!object_.symmetry.hasFreeAxis()) return covariance;
     const Eigen::Vector3d axis = belief_.pose.linear() * object_.symmetry.free_axis;
     const double spin = axis.dot(covariance.bottomRightCorner<3, 3>() * axis);
@@ -480,7 +480,7 @@ class Tracker::Impl {
     if (refined.texture_information.isZero()) return Matrix6d::Zero();
     Twist most;
     most << Eigen::Vector3d::Constant(0.005), Eigen::Vector3d::Constant(0.1);
-    Matrix6d contour = refined.contour_information;
+    Matrix6d contour = refined.information - refined.texture_information;
     contour.diagonal() += most.cwiseAbs2().cwiseInverse();
     if (object_.symmetry.hasFreeAxis()) contour += 1e6 * freeSpin(refined.camera_from_object);
     return kLearnedError * contour.inverse();
@@ -771,9 +771,7 @@ class Tracker::Impl {
       leverage_ = refined.leverage;
       learnScatter(refined.scatter);
       learned_error_ = errorOfLearning(refined);
-      belief_.update(
-          refined.camera_from_object,
-          refined.information + (1 / std::max(1.0, scatter_) - 1) * refined.contour_information);
+      belief_.update(refined.camera_from_object, refined.information);
       usual_residual_ = usual_residual_ > 0
                             ? usual_residual_ + 0.1 * (refined.residual - usual_residual_)
                             : refined.residual;

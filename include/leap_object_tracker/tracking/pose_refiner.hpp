@@ -41,8 +41,7 @@ struct EyeSupport {
 struct RefinedPose {
   Pose camera_from_object = Pose::Identity();
   Matrix6d information = Matrix6d::Zero();          ///< of the image alone, of the camera twist
-  Matrix6d contour_information = Matrix6d::Zero();  ///< the share of it that the contour gives
-  Matrix6d texture_information = Matrix6d::Zero();  ///< and texture
+  Matrix6d texture_information = Matrix6d::Zero();  ///< the share of it that texture gives
   /// Mean over the contour that was found of the squared Jacobian of its place across it [px^2], by
   /// the camera twist: how far the contour moves with the pose, whatever the noise.
   Matrix6d leverage = Matrix6d::Zero();
