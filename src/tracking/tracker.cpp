@@ -95,8 +95,11 @@ constexpr float kOutsideVolume = 1000;    // [nats] against a pose outside the w
 constexpr int kNearFrames = 30;  // for which a lost object is looked for near its last pose
 constexpr double kRecallPositionSigma = 0.01;  // [m]
 constexpr double kRecallRotationSigma = 0.3;   // [rad]
-constexpr double kFoundPositionSigma = 0.003;  // [m]
-constexpr double kFoundRotationSigma = 0.05;   // [rad]
+// Of what is found once more so soon the velocity is known, unless it is higher.
+constexpr double kFoundAgain = 0.15;               // [s]
+constexpr double kFastest = 4, kFastestTurn = 20;  // [m/s], [rad/s]
+constexpr double kFoundPositionSigma = 0.003;      // [m]
+constexpr double kFoundRotationSigma = 0.05;       // [rad]
 
 /// [nats] by which a prior speaks against a pose.
 double surprise(const PosePrior& prior, const Pose& pose) {
@@ -152,12 +155,14 @@ class Tracker::Impl {
     confirming_ = on_probation_ = false;
     last_seen_.reset();
     remembered_.reset();
+    last_found_.reset();
     last_stamp_.reset();
   }
 
   void search() {
     report_.state = TrackerState::kSearching;
     remembered_.reset();
+    last_found_.reset();
     last_stamp_.reset();
     last_seen_.reset();
     confirming_ = on_probation_ = false;
@@ -193,6 +198,8 @@ class Tracker::Impl {
     if (report_.state == TrackerState::kIdle) return std::nullopt;
 
     Pose camera_motion = cameraMotion(fixed_from_camera);
+    if (last_found_)
+      last_found_->camera_from_object = camera_motion * last_found_->camera_from_object;
     if (report_.state != TrackerState::kTracking && !confirming_) {
       lookFor(frame, camera_motion);
       if (!confirming_ || !found_sure_) return std::nullopt;
@@ -224,7 +231,11 @@ class Tracker::Impl {
     scoreParticles();
     particles_ms += millisecondsSince(started);
     const RefinedPose refined = features_.alone() ? refineByFeatures() : refineBest();
+    const bool on_trial = on_probation_ && !confirming_;
     takeOver(refined);
+    // It may have moved farther than was expected of what was only just found.
+    if (on_trial && report_.state == TrackerState::kLost)
+      return trackInArena(frame, fixed_from_camera);
     if (report_.state == TrackerState::kTracking && weak_frames_ == 0) considerTurned();
     if (report_.state == TrackerState::kTracking) askForSecondOpinion(frame);
     report_.filter_ms = millisecondsSince(started);
@@ -345,7 +356,16 @@ class Tracker::Impl {
 
   /// A pose that must prove itself in the next frame.
   void takeUp(const Pose& pose, Stamp stamp, bool sure) {
-    begin(beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma), sure);
+    PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
+    if (last_found_) {
+      const double dt = seconds(stamp - last_found_->stamp);
+      const Twist moved = cameraTwistBetween(last_found_->camera_from_object, pose);
+      if (dt > 0 && dt <= kFoundAgain && moved.head<3>().norm() < kFastest * dt &&
+          moved.tail<3>().norm() < kFastestTurn * dt)
+        belief.velocity = moved / dt;
+    }
+    last_found_ = Found{stamp, pose};
+    begin(belief, sure);
     last_stamp_ = stamp;
     confirming_ = true;
   }
@@ -823,11 +843,16 @@ class Tracker::Impl {
   int learned_frames_ = 0;  ///< in which texture could be learned
   double texture_support_ = 0;
   bool fresh_ = false;
-  bool proven_ = false;             ///< seen clearly since the start
-  bool confirming_ = false;         ///< the last search found something
-  bool found_sure_ = false;         ///< and needs no other frame to be believed
-  bool on_probation_ = false;       ///< it was, and must prove itself in the next one
-  std::optional<Pose> last_seen_;   ///< where the object was when the tracker stood by it
+  bool proven_ = false;            ///< seen clearly since the start
+  bool confirming_ = false;        ///< the last search found something
+  bool found_sure_ = false;        ///< and needs no other frame to be believed
+  bool on_probation_ = false;      ///< it was, and must prove itself in the next one
+  std::optional<Pose> last_seen_;  ///< where the object was when the tracker stood by it
+  struct Found {
+    Stamp stamp;
+    Pose camera_from_object;
+  };
+  std::optional<Found> last_found_;
   std::optional<Pose> remembered_;  ///< the same, for as long as it takes
 };
 
