@@ -305,8 +305,11 @@ class Tracker::Impl {
     const bool near =
         last_seen_ &&
         (found.camera_from_object.translation() - last_seen_->translation()).norm() < kRefoundReach;
+    // What was tracked before is known to show, but for what hides it where it was.
+    const bool elsewhere = remembered_ && !near;
     if (found.evidence >= kCompelling)
-      return found.support() >= kCompelledSupport && found.insideShare() >= kCompelledInside;
+      return found.support() >= (elsewhere ? kFoundSupport : kCompelledSupport) &&
+             found.insideShare() >= kCompelledInside;
     return found.support() >= (near ? kRefoundSupport : kFoundSupport) &&
            found.strength() >= (near ? kRefoundStrength : kFoundStrength) &&
            found.insideShare() >= kFoundInside;
