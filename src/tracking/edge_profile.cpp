@@ -1,8 +1,9 @@
 #include "leap_object_tracker/tracking/edge_profile.hpp"
 
-#include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 
 namespace leap_object_tracker {
 namespace {
@@ -43,6 +44,57 @@ class NormalTable {
   Table below_{}, density_{};
 };
 
+using Unknowns = std::array<double, kUnknowns>;
+
+/// Solves positive definite systems of the first `size` unknowns by Cholesky's factors L L'.
+class NormalEquations {
+ public:
+  explicit NormalEquations(int size) : size_(static_cast<std::size_t>(size)) {}
+
+  /// Of the lower triangle.
+  double& at(std::size_t row, std::size_t column) { return factor_[row][column]; }
+
+  /// To be called once all is filled in.
+  void factorize() {
+    for (std::size_t j = 0; j < size_; ++j) {
+      for (std::size_t k = 0; k < j; ++k)
+        for (std::size_t i = j; i < size_; ++i) factor_[i][j] -= factor_[i][k] * factor_[j][k];
+      inverse_[j] = 1 / std::sqrt(factor_[j][j]);
+      for (std::size_t i = j; i < size_; ++i) factor_[i][j] *= inverse_[j];
+    }
+  }
+
+  Unknowns solve(const Unknowns& right) const {
+    Unknowns x = forward(right);
+    for (std::size_t i = size_; i-- > 0;) {
+      for (std::size_t k = i + 1; k < size_; ++k) x[i] -= factor_[k][i] * x[k];
+      x[i] *= inverse_[i];
+    }
+    return x;
+  }
+
+  /// x' A^-1 x.
+  double inverseForm(const Unknowns& x) const {
+    const Unknowns y = forward(x);
+    double sum = 0;
+    for (std::size_t i = 0; i < size_; ++i) sum += y[i] * y[i];
+    return sum;
+  }
+
+ private:
+  Unknowns forward(Unknowns x) const {
+    for (std::size_t i = 0; i < size_; ++i) {
+      for (std::size_t k = 0; k < i; ++k) x[i] -= factor_[i][k] * x[k];
+      x[i] *= inverse_[i];
+    }
+    return x;
+  }
+
+  std::size_t size_;
+  std::array<Unknowns, kUnknowns> factor_{};
+  Unknowns inverse_{};  ///< of its diagonal
+};
+
 }  // namespace
 
 std::optional<ProfileEdge> fitProfile(const float* grey, int first, int count, double blur,
@@ -65,7 +117,7 @@ std::optional<ProfileEdge> fitProfile(const float* grey, int first, int count, d
   const bool ramp_after = std::min<double>(last, neighbours.after) >= kNarrowestRamp;
 
   // Columns: near level, far level, shift, ramps, level beyond each neighbour and its shift.
-  Eigen::Matrix<float, kLength, kUnknowns, Eigen::ColMajor> basis;
+  std::array<std::array<float, kLength>, kUnknowns> basis;
   const int near_ramp = ramp_before ? 3 : -1,
             far_ramp = ramp_after ? 3 + (ramp_before ? 1 : 0) : -1;
   int unknowns = 3 + (ramp_before ? 1 : 0) + (ramp_after ? 1 : 0);
@@ -82,62 +134,58 @@ std::optional<ProfileEdge> fitProfile(const float* grey, int first, int count, d
     if (before) {
       const float away = (s - static_cast<float>(neighbours.before)) * inverse;
       const float inside = normal.below(away);
-      basis(i, beyond_before) = 1 - inside;
-      basis(i, beyond_before + 1) = normal.density(away) * inverse;
+      basis[beyond_before][i] = 1 - inside;
+      basis[beyond_before + 1][i] = normal.density(away) * inverse;
       near_share -= 1 - inside;
     }
     if (after) {
       const float away = (s - static_cast<float>(neighbours.after)) * inverse;
       const float outside = normal.below(away);
-      basis(i, beyond_after) = outside;
-      basis(i, beyond_after + 1) = normal.density(away) * inverse;
+      basis[beyond_after][i] = outside;
+      basis[beyond_after + 1][i] = normal.density(away) * inverse;
       far_share -= outside;
     }
-    basis(i, 0) = near_share;
-    basis(i, 1) = far_share;
-    basis(i, 2) = bell * inverse;
+    basis[0][i] = near_share;
+    basis[1][i] = far_share;
+    basis[2][i] = bell * inverse;
     // A ramp that begins at the edge, blurred.
-    if (ramp_before) basis(i, near_ramp) = s * near_share - static_cast<float>(blur) * bell;
-    if (ramp_after) basis(i, far_ramp) = s * far_share + static_cast<float>(blur) * bell;
+    if (ramp_before) basis[near_ramp][i] = s * near_share - static_cast<float>(blur) * bell;
+    if (ramp_after) basis[far_ramp][i] = s * far_share + static_cast<float>(blur) * bell;
     low = std::min(low, grey[i]);
     high = std::max(high, grey[i]);
   }
   const float range = high - low;
   if (range < 2 * kLeastNoise) return std::nullopt;
 
-  using Square = Eigen::Matrix<double, kUnknowns, kUnknowns>;
-  using Vector = Eigen::Matrix<double, kUnknowns, 1>;
-  Square normal_matrix = Square::Identity();
-  Vector right = Vector::Zero();
-  for (int a = 0; a < unknowns; ++a) {
-    for (int b = 0; b <= a; ++b) {
-      float sum = 0;
-      for (int i = 0; i < count; ++i) sum += basis(i, a) * basis(i, b);
-      normal_matrix(a, b) = normal_matrix(b, a) = static_cast<double>(sum);
-    }
-    float sum = 0;
-    for (int i = 0; i < count; ++i) sum += basis(i, a) * (grey[i] - low);
-    right[a] = static_cast<double>(sum);
-  }
+  NormalEquations equations(unknowns);
+  Unknowns right{};
   // Levels and ramps are of the order of the range: binds what the profile leaves open.
   const double noise_share = std::pow(kLeastNoise / static_cast<double>(range), 2);
   for (int a = 0; a < unknowns; ++a) {
+    const auto row = static_cast<std::size_t>(a);
+    for (int b = 0; b <= a; ++b) {
+      float sum = 0;
+      for (int i = 0; i < count; ++i) sum += basis[row][i] * basis[b][i];
+      equations.at(row, static_cast<std::size_t>(b)) = static_cast<double>(sum);
+    }
     const bool ramp = a == near_ramp || a == far_ramp;
-    normal_matrix(a, a) += noise_share * (ramp ? 1 / (kWidestRamp * kWidestRamp) : 0.25);
+    equations.at(row, row) += noise_share * (ramp ? 1 / (kWidestRamp * kWidestRamp) : 0.25);
+    float sum = 0;
+    for (int i = 0; i < count; ++i) sum += basis[row][i] * (grey[i] - low);
+    right[row] = static_cast<double>(sum);
   }
-  const Eigen::LDLT<Square> solver(normal_matrix);
-  const Vector fitted = solver.solve(right);
+  equations.factorize();
+  const Unknowns fitted = equations.solve(right);
   double squares = 0;
   for (int i = 0; i < count; ++i) {
     float value = low;
-    for (int a = 0; a < unknowns; ++a) value += basis(i, a) * static_cast<float>(fitted[a]);
+    for (int a = 0; a < unknowns; ++a) value += basis[a][i] * static_cast<float>(fitted[a]);
     squares += static_cast<double>((grey[i] - value) * (grey[i] - value));
   }
   const double noise = std::max(kLeastNoise * kLeastNoise, squares / (count - unknowns));
-  Vector unit = Vector::Zero();
-  unit[0] = -1, unit[1] = 1;
+  Unknowns unit{-1, 1};
   const double step = fitted[1] - fitted[0];
-  const double step_variance = noise * unit.dot(solver.solve(unit));
+  const double step_variance = noise * equations.inverseForm(unit);
   if (step * step < kSignificance * kSignificance * step_variance) return std::nullopt;
   ProfileEdge edge;
   edge.step = step;
@@ -145,7 +193,7 @@ std::optional<ProfileEdge> fitProfile(const float* grey, int first, int count, d
   edge.offset = -fitted[2] / step;
   // Of the ratio, to first order.
   unit[0] = -edge.offset, unit[1] = edge.offset, unit[2] = 1;
-  edge.variance = noise * unit.dot(solver.solve(unit)) / (step * step);
+  edge.variance = noise * equations.inverseForm(unit) / (step * step);
   return edge;
 }
 
