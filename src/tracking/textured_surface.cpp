@@ -61,6 +61,7 @@ constexpr float kFreedom = 9;        // of Student's t-distribution
 constexpr double kIndependent = 5;   // places that one independent residual needs
 constexpr int kGainFits = 3;
 constexpr float kGainSlopes = 0.14F;  // a 100 px: deviation of the gain's slope
+constexpr float kLeastGain = 0.15F;   // of what is known, in a place that may look like it
 constexpr float kOutlier = 3;         // deviations of a place that looks otherwise
 /// What errs of residuals besides noise.
 struct Errors {
@@ -548,7 +549,8 @@ double TexturedSurface::support(const std::array<EdgeField, 2>& fields,
   for (int eye = 0; eye < 2; ++eye) {
     compareInSight(fields, eye, camera_from_object, samples);
     for (const SurfaceSample& s : samples)
-      if (s.residual * s.residual < kOutlier * kOutlier * s.variance) alike += 1;
+      if (s.gain > kLeastGain && s.residual * s.residual < kOutlier * kOutlier * s.variance)
+        alike += 1;
   }
   return alike / (2 * static_cast<double>(in_sight_.size()));
 }

@@ -79,7 +79,8 @@ constexpr double kRefoundReach = 0.03;    // [m]
 constexpr double kSameReach = 0.015, kSameTurn = 0.35;  // [m], [rad]
 constexpr double kSameSupport = 0.48, kSameStrength = 0.12;
 constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] likewise
-constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;    // [nats/px] once, and until then
+constexpr double kFaintStrength = 0.1;  // [nats/px] of a pose that does not last
+constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;  // [nats/px] once, and until then
 constexpr double kFoundInside = 0.3;       // share of the contour inside the images
 constexpr double kCompelling = 160;        // [nats] of evidence that chance does not bring about
 constexpr double kCompelledSupport = 0.6;  // and what then is enough
@@ -97,6 +98,7 @@ constexpr double kRecallPositionSigma = 0.01;  // [m]
 constexpr double kRecallRotationSigma = 0.3;   // [rad]
 // Of what is found once more so soon the velocity is known, unless it is higher.
 constexpr double kFoundAgain = 0.15;               // [s]
+constexpr double kBlurring = 1;                    // [m/s]
 constexpr double kFastest = 4, kFastestTurn = 20;  // [m/s], [rad/s]
 constexpr double kFoundPositionSigma = 0.003;      // [m]
 constexpr double kFoundRotationSigma = 0.05;       // [rad]
@@ -265,7 +267,8 @@ class Tracker::Impl {
       const Pose pose = asLastSeen(candidate.camera_from_object);
       const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
       known = features_.absolute(frame, regions(belief), pose);
-      const bool other = !known && last_seen_ && features_.refuse(pose);
+      const bool other =
+          !known && last_seen_ && !fastSinceFound(pose, frame.stamp) && features_.refuse(pose);
       refused = refused || other;
       return accepted = !other;
     };
@@ -357,16 +360,27 @@ class Tracker::Impl {
     return known.has_value();
   }
 
+  /// Of what was found a moment ago and is found again.
+  std::optional<Twist> velocitySinceFound(const Pose& pose, Stamp stamp) const {
+    if (!last_found_) return std::nullopt;
+    const double dt = seconds(stamp - last_found_->stamp);
+    const Twist moved = cameraTwistBetween(last_found_->camera_from_object, pose);
+    if (dt <= 0 || dt > kFoundAgain || moved.head<3>().norm() > kFastest * dt ||
+        moved.tail<3>().norm() > kFastestTurn * dt)
+      return std::nullopt;
+    return moved / dt;
+  }
+
+  /// Whether motion may blur landmarks beyond recognition.
+  bool fastSinceFound(const Pose& pose, Stamp stamp) const {
+    const auto velocity = velocitySinceFound(pose, stamp);
+    return velocity && velocity->head<3>().norm() > kBlurring;
+  }
+
   /// A pose that must prove itself in the next frame.
   void takeUp(const Pose& pose, Stamp stamp, bool sure) {
     PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
-    if (last_found_) {
-      const double dt = seconds(stamp - last_found_->stamp);
-      const Twist moved = cameraTwistBetween(last_found_->camera_from_object, pose);
-      if (dt > 0 && dt <= kFoundAgain && moved.head<3>().norm() < kFastest * dt &&
-          moved.tail<3>().norm() < kFastestTurn * dt)
-        belief.velocity = moved / dt;
-    }
+    if (const auto velocity = velocitySinceFound(pose, stamp)) belief.velocity = *velocity;
     last_found_ = Found{stamp, pose};
     begin(belief, sure);
     last_stamp_ = stamp;
@@ -384,7 +398,7 @@ class Tracker::Impl {
     usual_residual_ = 0;
     scatter_ = 1;
     frames_to_opinion_ = opinion_period_ = kFirstOpinion;
-    weak_frames_ = 0;
+    weak_frames_ = faint_frames_ = 0;
     leverage_.setZero();
     learned_error_.setZero();
     fresh_ = true;
@@ -769,14 +783,18 @@ class Tracker::Impl {
         (refined.evidence >= kClearEvidence && report_.support >= kClearSupport);
     const double strength = features_.alone() || compelling ? kProvenStrength : refined.strength();
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
+    const bool carried =
+        landmark_support >= kLandmarkSupport || texture_support_ >= kTextureSupport;
+    faint_frames_ =
+        strength < kFaintStrength && !carried && !refined.hidden_eye ? faint_frames_ + 1 : 0;
+    const bool faint = faint_frames_ >= kPatience;
     // No other body takes the place of one whose contour is all there from frame to frame.
     const bool unbroken =
         !confirming_ && !on_probation_ && weak_frames_ == 0 && report_.support >= kUnbrokenSupport;
     const bool supported =
-        (proven_ || strength >= kLeastStrength || (confirming_ && sameAsLast(refined))) &&
+        !faint && (proven_ || strength >= kLeastStrength || (confirming_ && sameAsLast(refined))) &&
         (unbroken || !features_.contradict(refined.camera_from_object, refined.bestEyeSupport())) &&
-        (report_.support >= kLeastSupport || landmark_support >= kLandmarkSupport ||
-         texture_support_ >= kTextureSupport ||
+        (report_.support >= kLeastSupport || carried ||
          (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_));
     if (confirming_ || on_probation_) {
       const bool again = !confirming_;
@@ -805,7 +823,7 @@ class Tracker::Impl {
       weak_frames_ = 0;
       last_seen_ = remembered_ = belief_.pose;
       report_.state = TrackerState::kTracking;
-    } else if (++weak_frames_ >= kPatience ||
+    } else if (++weak_frames_ >= kPatience || faint ||
                (report_.support < kNothingLeft && !features_.alone()) ||
                belief_.poseCovariance().topLeftCorner<3, 3>().diagonal().maxCoeff() >
                    kLostSpread * kLostSpread) {
@@ -837,6 +855,7 @@ class Tracker::Impl {
   Appearance appearance_;
   std::vector<std::uint32_t> order_;  ///< of the particles, the best ones first
   int weak_frames_ = 0;
+  int faint_frames_ = 0;       ///< in a row, with hardly any evidence for the pose
   double usual_residual_ = 0;  ///< [px]
   double scatter_ = 1;         ///< RefinedPose::scatter of the frames before, over the usual one
   Matrix6d leverage_ = Matrix6d::Zero();       ///< of the last supported pose
