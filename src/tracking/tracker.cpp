@@ -769,6 +769,7 @@ class Tracker::Impl {
     belief_ = beliefAt(*better, kFoundPositionSigma, kFoundRotationSigma);
     belief_.velocity = old.velocity;
     initializeFilter();
+    tracked_frames_ = kFirstFrames;  // as young again
     last_seen_ = remembered_ = belief_.pose;
   }
 

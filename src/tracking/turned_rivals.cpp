@@ -20,6 +20,7 @@ constexpr double kContourMargin = 15, kContourShare = 0.15, kYoungContourShare =
 constexpr double kShadedMargin = 4, kShadedShare = 0.03;
 constexpr double kLead = 40,
                  kYoungLead = 20;       // [nats] by which a rival must be better over all looks
+constexpr double kCredit = 40;          // [nats] that a pose can earn in many looks
 constexpr double kLeastSupport = 0.68;  // share of the contour that it must have
 
 /// What of a difference is clear.
@@ -113,10 +114,11 @@ std::optional<Pose> TurnedRivals::look(const Pose& pose, const std::vector<Pose>
   }
   if (best > 0) {
     const Pose turn = pose.inverse() * compared[best].camera_from_object;
-    if (!rival_ || angleBetween(rival_->linear(), turn.linear()) > kApart) lead_ = 0;
+    if (!rival_ || angleBetween(rival_->linear(), turn.linear()) > kApart)
+      lead_ = std::min(lead_, 0.0);
     rival_ = turn;
   }
-  lead_ = std::max(0.0, lead_ + gain);
+  lead_ = std::max(young ? 0.0 : -kCredit, lead_ + gain);
   if (lead_ < (young ? kYoungLead : kLead)) return std::nullopt;
   forget();
   return compared[best].camera_from_object;
