@@ -715,13 +715,22 @@ class Tracker::Impl {
         features_.speak() && (score(by_features) >= score(best) ||
                               agree(by_features.camera_from_object, best.camera_from_object));
     if (use_features) best = by_features;
-    const bool likely = expected(best.camera_from_object);
-    if (!likely) belief_.widen(doubt(belief_.pose));
-    refineExactly(refiner_, model_, measurement_.fields(), camera_.baseline,
-                  use_features ? with_features
-                  : likely     ? prior
-                               : doubted,
-                  appearance_, best);
+    const auto makeExact = [&](RefinedPose& pose) {
+      refineExactly(refiner_, model_, measurement_.fields(), camera_.baseline,
+                    use_features                        ? with_features
+                    : expected(pose.camera_from_object) ? prior
+                                                        : doubted,
+                    appearance_, pose);
+    };
+    // What the contour of a view nearby prefers to the prediction must be better on its own, too.
+    RefinedPose as_predicted = refined[0];
+    if (use_features || agree(as_predicted.camera_from_object, best.camera_from_object)) {
+      makeExact(best);
+    } else {
+      tbb::parallel_invoke([&] { makeExact(best); }, [&] { makeExact(as_predicted); });
+      if (score(as_predicted) > score(best)) best = as_predicted;
+    }
+    if (!expected(best.camera_from_object)) belief_.widen(doubt(belief_.pose));
     if (use_features) best.information += with_features.information - prior.information;
     return best;
   }
