@@ -129,7 +129,7 @@ bool FeatureTracking::contradict(const Pose& camera_from_object, double contour_
 
 bool FeatureTracking::refuse(const Pose& found) const {
   const std::vector<Pose> poses = equivalents(found);
-  return !unsure_ && measurement_.features().size() >= kTextured &&
+  return measurement_.features().size() >= kTextured &&
          std::any_of(poses.begin(), poses.end(), [&](const Pose& pose) { return wouldKnow(pose); });
 }
 

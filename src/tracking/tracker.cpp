@@ -262,13 +262,14 @@ class Tracker::Impl {
     }
     std::optional<Pose> known;
     bool accepted = false, refused = false;
+    const bool unconfirmed = anew_ && features_.unsure();
     const auto accept = [&](const RefinedPose& candidate) {
       if (!goodStart(candidate)) return false;
       const Pose pose = asLastSeen(candidate.camera_from_object);
       const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
       known = features_.absolute(frame, regions(belief), pose);
-      const bool other =
-          !known && last_seen_ && !fastSinceFound(pose, frame.stamp) && features_.refuse(pose);
+      const bool other = !known && last_seen_ && !unconfirmed &&
+                         !fastSinceFound(pose, frame.stamp) && features_.refuse(pose);
       refused = refused || other;
       return accepted = !other;
     };
@@ -289,6 +290,7 @@ class Tracker::Impl {
         (report_.support >= kSureStart &&
          (first || (found->evidence >= kCompelling && found->strength() >= kProvenStrength)));
     on_probation_ = found_sure_ && !same && !first;
+    anew_ = !known && (!last_seen_ || unconfirmed);
     takeUp(known.value_or(asLastSeen(found->camera_from_object)), frame.stamp, known.has_value());
     beginLooks(std::clamp(found->bright_inside, 0.3, 0.9));
     search_.learn(belief_.pose, appearance_);
@@ -875,10 +877,11 @@ class Tracker::Impl {
   int learned_frames_ = 0;  ///< in which texture could be learned
   double texture_support_ = 0;
   bool fresh_ = false;
-  bool proven_ = false;            ///< seen clearly since the start
-  bool confirming_ = false;        ///< the last search found something
-  bool found_sure_ = false;        ///< and needs no other frame to be believed
-  bool on_probation_ = false;      ///< it was, and must prove itself in the next one
+  bool proven_ = false;        ///< seen clearly since the start
+  bool confirming_ = false;    ///< the last search found something
+  bool found_sure_ = false;    ///< and needs no other frame to be believed
+  bool on_probation_ = false;  ///< it was, and must prove itself in the next one
+  bool anew_ = false;          ///< found from nothing, not in an orientation that landmarks know
   std::optional<Pose> last_seen_;  ///< where the object was when the tracker stood by it
   struct Found {
     Stamp stamp;
