@@ -120,13 +120,16 @@ class Rivals : public Shaded {
   }
 
   /// Looks at the drawn truth, at most so often, until a pose is to be taken.
+  /// @param earlier looks at which the true pose was held against the other
   std::optional<Pose> lookAt(const Pose& own, const Pose& other, int looks, int& needed,
-                             bool young = false) {
+                             bool young = false, int earlier = 0) {
     ContourMeasurement measurement(ContourParams(), Eyes::kBoth, camera_);
     const cv::Rect whole(cv::Point(), camera_.size);
     measurement.observe(castFrame(object_.mesh, truth_, camera_), {whole, whole});
     const ShadedView shaded_view(object_.mesh, camera_);
     TurnedRivals rivals(object_.symmetry, model_, refiner_, shaded_view, camera_.baseline);
+    for (int i = 0; i < earlier; ++i)
+      EXPECT_FALSE(rivals.look(truth_, {flipped_}, measurement, {}, false));
     for (needed = 1; needed <= looks; ++needed)
       if (const auto better = rivals.look(own, {other}, measurement, {}, young)) return better;
     return std::nullopt;
@@ -157,6 +160,13 @@ TEST_F(Rivals, takeThePlaceOfAYoungPoseSooner) {
   ASSERT_TRUE(lookAt(flipped_, truth_, 10, late));
   ASSERT_TRUE(lookAt(flipped_, truth_, 10, soon, true));
   EXPECT_LT(soon, late);
+}
+
+TEST_F(Rivals, needLongerAgainstAPoseThatWasBetterForLong) {
+  int soon = 0, late = 0;
+  ASSERT_TRUE(lookAt(flipped_, truth_, 20, soon));
+  ASSERT_TRUE(lookAt(flipped_, truth_, 20, late, false, 10));
+  EXPECT_GT(late, soon);
 }
 
 TEST_F(Rivals, leaveTheTruePoseAlone) {

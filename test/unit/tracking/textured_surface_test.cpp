@@ -89,6 +89,16 @@ TEST_F(Texture, supportsThePoseItIsSeenAtOnly) {
   EXPECT_EQ(surface.support(fields_, truth_), 0);
 }
 
+TEST_F(Texture, isNotSeenInTheDark) {
+  show(0.011);
+  TexturedSurface surface(body_, camera_);
+  learn(surface);
+  const cv::Rect where(200, 140, 240, 200);
+  const cv::Mat dark(camera_.size, CV_8UC1, cv::Scalar(3));
+  for (EdgeField& field : fields_) field.build(dark, where);
+  EXPECT_EQ(surface.support(fields_, truth_), 0);
+}
+
 TEST_F(Texture, isMatchedThoughAnEyeIsDarker) {
   show(0.011);
   TexturedSurface surface(body_, camera_);

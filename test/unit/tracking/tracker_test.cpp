@@ -127,6 +127,25 @@ TEST_F(MovingBox, isFoundAtOnceWhereItWasThoughMuchOfItIsCovered) {
   EXPECT_LT(positionError(*estimate, 0), 0.001);
 }
 
+TEST_F(MovingBox, isFollowedFromTheSecondFrameThoughItReturnsFast) {
+  Tracker tracker(TrackerParams(), object_, camera_);
+  tracker.start(truthAt(0));
+  int frame = 0;
+  for (; frame < 3; ++frame) tracker.track(frameAt(0));
+  for (int gone = 0; gone < 40; ++gone, ++frame) tracker.track(darkAt(frame));
+  ASSERT_EQ(tracker.report().state, TrackerState::kSearching);
+  Pose place = truthAt(0);
+  place.translation() << -0.07, 0.01, 0.13;
+  for (int seen = 0; seen < 5; ++seen, ++frame) {
+    const auto estimate = tracker.track(drawnFrame(object_, place, camera_, 1 + frame * kPeriod));
+    if (seen > 0) {
+      ASSERT_TRUE(estimate) << seen;
+      EXPECT_LT((estimate->camera_from_object.translation() - place.translation()).norm(), 0.002);
+    }
+    place.translation().x() += 0.03;  // 1.5 m/s
+  }
+}
+
 TEST_F(MovingBox, isFollowedByTheEyeThatSeesMostOfIt) {
   Tracker tracker(TrackerParams(), object_, camera_);
   tracker.start(truthAt(0));
