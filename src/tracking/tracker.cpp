@@ -882,13 +882,13 @@ class Tracker::Impl {
   bool found_sure_ = false;    ///< and needs no other frame to be believed
   bool on_probation_ = false;  ///< it was, and must prove itself in the next one
   bool anew_ = false;          ///< found from nothing, not in an orientation that landmarks know
-  std::optional<Pose> last_seen_;  ///< where the object was when the tracker stood by it
+  std::optional<Pose> last_seen_;   ///< where the object was when the tracker stood by it
+  std::optional<Pose> remembered_;  ///< the same, for as long as it takes
   struct Found {
     Stamp stamp;
     Pose camera_from_object;
   };
-  std::optional<Found> last_found_;
-  std::optional<Pose> remembered_;  ///< the same, for as long as it takes
+  std::optional<Found> last_found_;  ///< by a search or by landmarks
 };
 
 Tracker::Tracker(const TrackerParams& params, const ObjectModel& object,
