@@ -1,15 +1,28 @@
-#include "leap_object_tracker/tracking/edge_profile.hpp"
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tracking/edge_profile.cpp"
+#include <hwy/foreach_target.h>
+// Highway wants its own header after foreach_target.h.
+#include <hwy/highway.h>
+// And this one after that.
+#include <hwy/contrib/math/math-inl.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 
-namespace leap_object_tracker {
-namespace {
+#include "leap_object_tracker/tracking/edge_profile.hpp"
+#include "normal_equations.hpp"
 
-constexpr int kUnknowns = 9;
+HWY_BEFORE_NAMESPACE();
+namespace leap_object_tracker {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr std::size_t kUnknowns = 9;
 constexpr int kLength = 2 * kLongestProfile + 1;
+constexpr std::size_t kPadded = 16;
+static_assert(kLength <= kPadded);
 constexpr double kWidestRamp = 0.08;  // [1/px] deviation of a ramp, as a share of the grey range
 constexpr double kNarrowestRamp = 5;  // [px] of a face without a ramp of its own
 constexpr int kShortestSide = 4;      // [px] that cutting off a neighbour must leave
@@ -17,89 +30,40 @@ constexpr double kReachOfBlur = 2.5;  // [blurs] beyond which an edge no longer 
 constexpr double kLeastNoise = 1.0;   // [grey levels]
 constexpr double kSignificance = 4;   // deviations that a step must have
 
-/// The normal distribution's cumulative function and density, by linear interpolation.
-class NormalTable {
- public:
-  NormalTable() {
-    for (int i = 0; i <= kSize; ++i) {
-      const double x = kRange * (2.0 * i / kSize - 1);
-      below_[static_cast<std::size_t>(i)] =
-          static_cast<float>(0.5 * std::erfc(-x / std::sqrt(2.0)));
-      density_[static_cast<std::size_t>(i)] =
-          static_cast<float>(std::exp(-0.5 * x * x) / std::sqrt(2 * M_PI));
-    }
-  }
-  float below(float x) const { return at(below_, x); }
-  float density(float x) const { return at(density_, x); }
+using Floats = hn::CappedTag<float, kPadded>;
+using Float = hn::Vec<Floats>;
 
- private:
-  static constexpr int kSize = 512;
-  static constexpr float kRange = 4;
-  using Table = std::array<float, kSize + 2>;
-  static float at(const Table& table, float x) {
-    const float place = (std::min(std::max(x, -kRange), kRange) + kRange) * (kSize / (2 * kRange));
-    const auto cell = static_cast<std::size_t>(place);
-    return table[cell] + (place - static_cast<float>(cell)) * (table[cell + 1] - table[cell]);
-  }
-  Table below_{}, density_{};
+/// Values along a profile, zeros behind the last.
+struct alignas(4 * kPadded) Column : std::array<float, kPadded> {};
+
+HWY_INLINE float dot(const Column& a, const Column& b) {
+  const Floats df;
+  Float sum = hn::Zero(df);
+  for (std::size_t i = 0; i < kPadded; i += hn::Lanes(df))
+    sum = hn::MulAdd(hn::Load(df, a.data() + i), hn::Load(df, b.data() + i), sum);
+  return hn::GetLane(hn::SumOfLanes(df, sum));
+}
+
+struct Normal {
+  Float below, density;
 };
 
-using Unknowns = std::array<double, kUnknowns>;
+/// The normal distribution's cumulative function, to 1e-7 (Abramowitz and Stegun 1964, 26.2.17),
+/// and density.
+HWY_INLINE Normal normalAt(Float x) {
+  const Floats df;
+  const auto set = [&](double value) HWY_ATTR { return hn::Set(df, static_cast<float>(value)); };
+  const Float density = hn::Mul(set(0.3989422804), hn::Exp(df, hn::Mul(set(-0.5), hn::Mul(x, x))));
+  const Float t = hn::Div(set(1), hn::MulAdd(set(0.2316419), hn::Abs(x), set(1)));
+  Float series = set(1.330274429);
+  for (const double factor : {-1.821255978, 1.781477937, -0.356563782, 0.319381530, 0.0})
+    series = hn::MulAdd(series, t, set(factor));
+  const Float tail = hn::Mul(density, series);
+  return {hn::IfThenElse(hn::Lt(x, hn::Zero(df)), tail, hn::Sub(set(1), tail)), density};
+}
 
-/// Solves positive definite systems of the first `size` unknowns by Cholesky's factors L L'.
-class NormalEquations {
- public:
-  explicit NormalEquations(int size) : size_(static_cast<std::size_t>(size)) {}
-
-  /// Of the lower triangle.
-  double& at(std::size_t row, std::size_t column) { return factor_[row][column]; }
-
-  /// To be called once all is filled in.
-  void factorize() {
-    for (std::size_t j = 0; j < size_; ++j) {
-      for (std::size_t k = 0; k < j; ++k)
-        for (std::size_t i = j; i < size_; ++i) factor_[i][j] -= factor_[i][k] * factor_[j][k];
-      inverse_[j] = 1 / std::sqrt(factor_[j][j]);
-      for (std::size_t i = j; i < size_; ++i) factor_[i][j] *= inverse_[j];
-    }
-  }
-
-  Unknowns solve(const Unknowns& right) const {
-    Unknowns x = forward(right);
-    for (std::size_t i = size_; i-- > 0;) {
-      for (std::size_t k = i + 1; k < size_; ++k) x[i] -= factor_[k][i] * x[k];
-      x[i] *= inverse_[i];
-    }
-    return x;
-  }
-
-  /// x' A^-1 x.
-  double inverseForm(const Unknowns& x) const {
-    const Unknowns y = forward(x);
-    double sum = 0;
-    for (std::size_t i = 0; i < size_; ++i) sum += y[i] * y[i];
-    return sum;
-  }
-
- private:
-  Unknowns forward(Unknowns x) const {
-    for (std::size_t i = 0; i < size_; ++i) {
-      for (std::size_t k = 0; k < i; ++k) x[i] -= factor_[i][k] * x[k];
-      x[i] *= inverse_[i];
-    }
-    return x;
-  }
-
-  std::size_t size_;
-  std::array<Unknowns, kUnknowns> factor_{};
-  Unknowns inverse_{};  ///< of its diagonal
-};
-
-}  // namespace
-
-std::optional<ProfileEdge> fitProfile(const float* grey, int first, int count, double blur,
-                                      const ProfileNeighbours& neighbours) {
-  static const NormalTable normal;
+std::optional<ProfileEdge> fit(const float* grey, int first, int count, double blur,
+                               const ProfileNeighbours& neighbours) {
   int last = first + count - 1;
   // Neighbours far enough away are cut off, nearer ones are part of the model.
   const double reach = kReachOfBlur * blur;
@@ -116,85 +80,113 @@ std::optional<ProfileEdge> fitProfile(const float* grey, int first, int count, d
   const bool ramp_before = std::min<double>(-first, -neighbours.before) >= kNarrowestRamp;
   const bool ramp_after = std::min<double>(last, neighbours.after) >= kNarrowestRamp;
 
-  // Columns: near level, far level, shift, ramps, level beyond each neighbour and its shift.
-  std::array<std::array<float, kLength>, kUnknowns> basis;
-  const int near_ramp = ramp_before ? 3 : -1,
-            far_ramp = ramp_after ? 3 + (ramp_before ? 1 : 0) : -1;
-  int unknowns = 3 + (ramp_before ? 1 : 0) + (ramp_after ? 1 : 0);
-  const int beyond_before = unknowns, beyond_after = unknowns + (before ? 2 : 0);
-  unknowns = beyond_after + (after ? 2 : 0);
-  if (count < unknowns + 2) return std::nullopt;
-  const auto inverse = static_cast<float>(1 / blur);
-  float low = grey[0], high = grey[0];
-  for (int i = 0; i < count; ++i) {
-    const auto s = static_cast<float>(first + i);
-    const float x = s * inverse;
-    const float far = normal.below(x), bell = normal.density(x);
-    float near_share = 1 - far, far_share = far;
-    if (before) {
-      const float away = (s - static_cast<float>(neighbours.before)) * inverse;
-      const float inside = normal.below(away);
-      basis[beyond_before][i] = 1 - inside;
-      basis[beyond_before + 1][i] = normal.density(away) * inverse;
-      near_share -= 1 - inside;
-    }
-    if (after) {
-      const float away = (s - static_cast<float>(neighbours.after)) * inverse;
-      const float outside = normal.below(away);
-      basis[beyond_after][i] = outside;
-      basis[beyond_after + 1][i] = normal.density(away) * inverse;
-      far_share -= outside;
-    }
-    basis[0][i] = near_share;
-    basis[1][i] = far_share;
-    basis[2][i] = bell * inverse;
-    // A ramp that begins at the edge, blurred.
-    if (ramp_before) basis[near_ramp][i] = s * near_share - static_cast<float>(blur) * bell;
-    if (ramp_after) basis[far_ramp][i] = s * far_share + static_cast<float>(blur) * bell;
-    low = std::min(low, grey[i]);
-    high = std::max(high, grey[i]);
-  }
-  const float range = high - low;
+  // Columns: ramps, level beyond each neighbour and its shift, then those of the edge itself: near
+  // level, far level, shift. The variances only ask for these, which is cheapest for the last.
+  std::size_t unknowns = 0;
+  const auto add = [&](bool wanted, std::size_t columns) {
+    const std::size_t at = unknowns;
+    if (wanted) unknowns += columns;
+    return at;
+  };
+  const std::size_t near_ramp = add(ramp_before, 1), far_ramp = add(ramp_after, 1);
+  const std::size_t beyond_before = add(before, 2), beyond_after = add(after, 2);
+  const std::size_t near_level = add(true, 3), far_level = near_level + 1, shift = near_level + 2;
+  const auto length = static_cast<std::size_t>(count);
+  if (length < unknowns + 2) return std::nullopt;
+  const auto [lowest, highest] = std::minmax_element(grey, grey + length);
+  const float low = *lowest, range = *highest - low;
   if (range < 2 * kLeastNoise) return std::nullopt;
 
-  NormalEquations equations(unknowns);
-  Unknowns right{};
+  std::array<Column, kUnknowns> basis;
+  Column values{};
+  std::copy(grey, grey + length, values.begin());
+  const Floats df;
+  const Float one = hn::Set(df, 1.0F), inverse = hn::Set(df, static_cast<float>(1 / blur));
+  for (std::size_t i = 0; i < kPadded; i += hn::Lanes(df)) {
+    const auto inside = hn::FirstN(df, length - std::min(i, length));
+    const auto store = [&](Float x, Column& column) HWY_ATTR {
+      hn::Store(hn::IfThenElseZero(inside, x), df, column.data() + i);
+    };
+    const Float s = hn::Iota(df, static_cast<float>(first) + static_cast<float>(i));
+    const Normal edge = normalAt(hn::Mul(s, inverse));
+    Float near_share = hn::Sub(one, edge.below), far_share = edge.below;
+    const auto fromNeighbour = [&](double place) HWY_ATTR {
+      return normalAt(hn::Mul(hn::Sub(s, hn::Set(df, static_cast<float>(place))), inverse));
+    };
+    if (before) {
+      const Normal neighbour = fromNeighbour(neighbours.before);
+      const Float beyond = hn::Sub(one, neighbour.below);
+      store(beyond, basis[beyond_before]);
+      store(hn::Mul(neighbour.density, inverse), basis[beyond_before + 1]);
+      near_share = hn::Sub(near_share, beyond);
+    }
+    if (after) {
+      const Normal neighbour = fromNeighbour(neighbours.after);
+      store(neighbour.below, basis[beyond_after]);
+      store(hn::Mul(neighbour.density, inverse), basis[beyond_after + 1]);
+      far_share = hn::Sub(far_share, neighbour.below);
+    }
+    store(near_share, basis[near_level]);
+    store(far_share, basis[far_level]);
+    store(hn::Mul(edge.density, inverse), basis[shift]);
+    // A ramp that begins at the edge, blurred.
+    const Float bend = hn::Mul(hn::Set(df, static_cast<float>(blur)), edge.density);
+    if (ramp_before) store(hn::Sub(hn::Mul(s, near_share), bend), basis[near_ramp]);
+    if (ramp_after) store(hn::MulAdd(s, far_share, bend), basis[far_ramp]);
+    store(hn::Sub(hn::Load(df, values.data() + i), hn::Set(df, low)), values);
+  }
+
+  NormalEquations<kUnknowns> equations(unknowns);
+  NormalEquations<kUnknowns>::Vector right;
   // Levels and ramps are of the order of the range: binds what the profile leaves open.
   const double noise_share = std::pow(kLeastNoise / static_cast<double>(range), 2);
-  for (int a = 0; a < unknowns; ++a) {
-    const auto row = static_cast<std::size_t>(a);
-    for (int b = 0; b <= a; ++b) {
-      float sum = 0;
-      for (int i = 0; i < count; ++i) sum += basis[row][i] * basis[b][i];
-      equations.at(row, static_cast<std::size_t>(b)) = static_cast<double>(sum);
-    }
-    const bool ramp = a == near_ramp || a == far_ramp;
-    equations.at(row, row) += noise_share * (ramp ? 1 / (kWidestRamp * kWidestRamp) : 0.25);
-    float sum = 0;
-    for (int i = 0; i < count; ++i) sum += basis[row][i] * (grey[i] - low);
-    right[row] = static_cast<double>(sum);
+  for (std::size_t a = 0; a < unknowns; ++a) {
+    for (std::size_t b = 0; b <= a; ++b)
+      equations.at(a, b) = static_cast<double>(dot(basis[a], basis[b]));
+    const bool ramp = a < beyond_before;
+    equations.at(a, a) += noise_share * (ramp ? 1 / (kWidestRamp * kWidestRamp) : 0.25);
+    right[a] = static_cast<double>(dot(basis[a], values));
   }
   equations.factorize();
-  const Unknowns fitted = equations.solve(right);
-  double squares = 0;
-  for (int i = 0; i < count; ++i) {
-    float value = low;
-    for (int a = 0; a < unknowns; ++a) value += basis[a][i] * static_cast<float>(fitted[a]);
-    squares += static_cast<double>((grey[i] - value) * (grey[i] - value));
+  const auto fitted = equations.solve(right);
+  for (std::size_t a = 0; a < unknowns; ++a) {
+    const Float part = hn::Set(df, static_cast<float>(fitted[a]));
+    for (std::size_t i = 0; i < kPadded; i += hn::Lanes(df))
+      hn::Store(
+          hn::NegMulAdd(part, hn::Load(df, basis[a].data() + i), hn::Load(df, values.data() + i)),
+          df, values.data() + i);
   }
-  const double noise = std::max(kLeastNoise * kLeastNoise, squares / (count - unknowns));
-  Unknowns unit{-1, 1};
-  const double step = fitted[1] - fitted[0];
-  const double step_variance = noise * equations.inverseForm(unit);
+  const auto squares = static_cast<double>(dot(values, values));
+  const double noise =
+      std::max(kLeastNoise * kLeastNoise, squares / static_cast<double>(length - unknowns));
+  NormalEquations<kUnknowns>::Vector unit{};
+  unit[near_level] = -1, unit[far_level] = 1;
+  const double step = fitted[far_level] - fitted[near_level];
+  const double step_variance = noise * equations.inverseForm(unit, near_level);
   if (step * step < kSignificance * kSignificance * step_variance) return std::nullopt;
   ProfileEdge edge;
   edge.step = step;
   edge.noise = std::sqrt(noise);
-  edge.offset = -fitted[2] / step;
+  edge.offset = -fitted[shift] / step;
   // Of the ratio, to first order.
-  unit[0] = -edge.offset, unit[1] = edge.offset, unit[2] = 1;
-  edge.variance = noise * equations.inverseForm(unit) / (step * step);
+  unit[near_level] = -edge.offset, unit[far_level] = edge.offset, unit[shift] = 1;
+  edge.variance = noise * equations.inverseForm(unit, near_level) / (step * step);
   return edge;
 }
 
+}  // namespace HWY_NAMESPACE
 }  // namespace leap_object_tracker
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace leap_object_tracker {
+
+HWY_EXPORT(fit);
+
+std::optional<ProfileEdge> fitProfile(const float* grey, int first, int count, double blur,
+                                      const ProfileNeighbours& neighbours) {
+  return HWY_DYNAMIC_DISPATCH(fit)(grey, first, count, blur, neighbours);
+}
+
+}  // namespace leap_object_tracker
+#endif

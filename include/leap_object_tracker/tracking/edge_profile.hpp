@@ -19,7 +19,7 @@ struct ProfileNeighbours {
 };
 
 /// Largest half length of a profile [px].
-constexpr int kLongestProfile = 8;
+constexpr int kLongestProfile = 7;
 
 /// Fits blurred steps between straight grey ramps to the grey values around an expected edge:
 ///   I(s) = (a0 + a1 s) (1 - H(s - d)) + (b0 + b1 s) H(s - d),   H(s) = Phi(s / blur),

@@ -82,6 +82,16 @@ TEST(EdgeProfile, SeesNoEdgeInNoiseOrInARamp) {
   EXPECT_LE(found, 4);
 }
 
+TEST(EdgeProfile, StaysFiniteBetweenNeighboursThatBlurHides) {
+  for (const double apart : {0.0, 0.01, 0.3, 0.7, 1.5}) {
+    const auto grey = profile(7, {0.2}, {200, 10}, {0, 0});
+    const auto edge = fitProfile(grey.data(), -7, 15, kBlur, {-apart, apart});
+    if (!edge) continue;
+    EXPECT_TRUE(std::isfinite(edge->offset)) << apart;
+    EXPECT_GT(edge->variance, 0) << apart;
+  }
+}
+
 TEST(EdgeProfile, RefusesProfilesThatAreTooShort) {
   const std::vector<float> grey(17, 100.0F);
   EXPECT_FALSE(fitProfile(grey.data(), -1, 9, kBlur, {}));
