@@ -35,6 +35,7 @@ ContourLines::Neighbours neighboursOf(const ContourLines::Arrays& lines, std::si
     const Float parallel = hn::MulAdd(nu, mu, hn::Mul(nv, mv));
     const auto beside = hn::And(hn::Lt(hn::Abs(along), hn::Set(df, kAlongside)),
                                 hn::Gt(hn::Abs(parallel), hn::Set(df, kParallel)));
+    if (hn::AllFalse(df, beside)) continue;
     const auto behind = hn::And(beside, hn::Lt(across, hn::Set(df, -kSame)));
     const auto ahead = hn::And(beside, hn::Gt(across, hn::Set(df, kSame)));
     before = hn::IfThenElse(behind, hn::Max(before, across), before);

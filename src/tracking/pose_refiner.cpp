@@ -73,12 +73,6 @@ SurfaceEvidence evidenceOf(const TexturedSurface* surface, const std::array<Edge
   return surface != nullptr ? surface->evidence(fields, pose) : SurfaceEvidence();
 }
 
-Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
-
 }  // namespace
 
 Pose movedInCamera(const Pose& camera_from_object, const Twist& camera_twist) {
@@ -191,7 +185,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
                         std::vector<Match>& matches, std::array<EyeSupport, 2>& eyes) const {
   matches.clear();
   const double focal = camera_.focal_length;
-  std::array<float, 2 * (kLongestRange + kRegionReach) + 5> profile{};
+  std::array<float, 2 * (kLongestRange + kRegionReach) + 5> profile{}, slopes{};
   std::array<float, 2 * (kLongestRange + kRegionReach) + 6> ratios{};
   for (int eye = 0; eye < 2; ++eye) {
     const EdgeField& field = fields[static_cast<std::size_t>(eye)];
@@ -246,11 +240,9 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           normal = -normal;
       }
       match.step = static_cast<float>(match.length) * expectedStep(point, to_light);
-      Eigen::Matrix<double, 2, 3> projection;
-      projection << scale, 0, -scale * x, 0, scale, -scale * y;
-      const Eigen::RowVector3d row = normal.transpose() * projection;
-      match.jacobian.head<3>() = row.transpose();
-      match.jacobian.tail<3>() = -(row * skew(arm)).transpose();
+      const Eigen::Vector3d row =
+          scale * Eigen::Vector3d(normal.x(), normal.y(), -normal.x() * x - normal.y() * y);
+      match.jacobian << row, arm.cross(row);
       match.samples = std::min(1.0, match.length / kIndependentLength);
       match.place = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
       if (point.limb > 0 && match.outline) {
@@ -298,10 +290,10 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         for (int k = low; k <= high; ++k)
           profile[static_cast<std::size_t>(k + span)] =
               sample(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
-        const auto slope = [&](int k) {
-          return 0.5F * (profile[static_cast<std::size_t>(k + span + 1)] -
-                         profile[static_cast<std::size_t>(k + span - 1)]);
-        };
+        for (int k = low + 1; k < high; ++k)
+          slopes[static_cast<std::size_t>(k + span)] =
+              0.5F * (profile[static_cast<std::size_t>(k + span + 1)] -
+                      profile[static_cast<std::size_t>(k + span - 1)]);
         // Grey values like the object's on the inner side and like the surroundings' on the outer.
         if (region) {
           ratios[static_cast<std::size_t>(low + span)] = 0;
@@ -331,13 +323,13 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         match.crowding = std::max(0.0, 0.25 * (4.0 - clearance));
         const float blur = static_cast<float>(std::max(1.0, 0.5 * own_range));
         for (int k = std::max(low + 2, -reach); k <= std::min(high - 2, reach); ++k) {
-          const float here = slope(k), size = std::abs(here);
+          const float* slope = &slopes[static_cast<std::size_t>(k + span)];
+          const float size = std::abs(*slope), sign = std::copysign(1.0F, *slope);
+          const float before = slope[-1], after = slope[1];
+          if (sign * before >= size || sign * after > size) continue;
           const float weakest =
               kVisibleSlope * field.slopeNoise(profile[static_cast<std::size_t>(k + span)]);
           if (size < weakest) continue;
-          const float before = slope(k - 1), after = slope(k + 1);
-          const float sign = here > 0 ? 1.0F : -1.0F;
-          if (sign * before >= size || sign * after > size) continue;
           const float bend = sign * before - 2 * size + sign * after;
           const float place =
               static_cast<float>(k) + (bend < 0 ? 0.5F * sign * (before - after) / bend : 0.0F);
@@ -345,7 +337,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
           float value = std::sqrt(size) * std::exp(-0.5F * place * place / (blur * blur));
           // Towards the outside an outline darkens where the object is brighter than what is
           // behind.
-          const bool brighter_inside = here < 0;
+          const bool brighter_inside = *slope < 0;
           if (region)
             value *= std::exp(kRegionPull * regionAt(k));
           else if (match.outline)
