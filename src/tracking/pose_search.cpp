@@ -37,9 +37,7 @@ constexpr std::size_t kKeptAtLikely = 30;  // hypotheses of such a place that mo
 constexpr std::size_t kKeptElsewhere = 8;
 constexpr int kChildren = 20;  // random steps of each, a round
 constexpr int kRounds = 4;
-constexpr std::size_t kRefinedAtLikely = 5;
-constexpr std::size_t kRefinedElsewhere = 1;
-constexpr std::size_t kUnmovedAtLikely = 5, kUnmovedElsewhere = 1;
+constexpr std::size_t kRefinedAtLikely = 5, kRefinedElsewhere = 1;  // moved and unmoved ones
 constexpr std::size_t kPromising = 16;    // poses that are refined to the end
 constexpr double kReach = 0.2;            // of a pose's error, as a share of the object's radius
 constexpr std::size_t kAsked = 3;         // places whose best pose is offered
@@ -53,6 +51,10 @@ constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 // Of the best score that so much contour could have: less speaks against a pose. Without it, views
 // that show more contour would win.
 constexpr float kToBeExpected = 0.65F;
+constexpr std::size_t kMostSurfaces = 40;  // where a body may be
+constexpr double kSurfaceStep = 0.35;      // of the body's size, to the poses beside such a place
+constexpr std::size_t kKeptAtSurface = 10, kRefinedAtSurface = 3;
+constexpr std::size_t kSurface = 1'000, kNear = 10'000;  // numbers of places without regions
 constexpr EdgeKernel kBlunt{3.0F, 3.0F};
 
 /// Even set over SO(3) (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1).
@@ -75,6 +77,11 @@ Eigen::Vector3d evenDirection(int i, int count) {
   const double z = 1 - (2 * i + 1.0) / count, ring = std::sqrt(1 - z * z);
   const double angle = i * M_PI * (3 - std::sqrt(5.0));
   return {ring * std::cos(angle), ring * std::sin(angle), z};
+}
+
+/// Orientations are laid out as seen along the ray to a place.
+Eigen::Matrix3d facingTo(const Eigen::Vector3d& place) {
+  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), place).toRotationMatrix();
 }
 
 /// One of each class of orientations that look the same.
@@ -206,6 +213,8 @@ PoseSearch::PoseSearch(const TrackerParams& params, const ObjectModel& object,
       shaded_view_(object.mesh, camera),
       agreement_(object.mesh, camera),
       shadow_(shadowAreaOf(object.mesh)),
+      surface_places_(camera, params.volume.nearest, params.volume.farthest,
+                      std::sqrt(shadow_.mean / M_PI)),
       pivots_(pivotsOf(object.mesh)),
       hull_(outermostVertices(object.mesh)),
       window_(windowOf(camera)),
@@ -501,29 +510,14 @@ std::vector<Pose> PoseSearch::turned(const Pose& camera_from_object) const {
   return poses;
 }
 
-std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
-                                            const std::optional<Pose>& near,
-                                            const std::function<bool(const RefinedPose&)>& accept) {
-  ++calls_;
-  const cv::Rect whole(cv::Point(), camera_.size);
-  tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
-    const bool used =
-        params_.eyes == Eyes::kBoth || params_.eyes == (eye == 0 ? Eyes::kLeft : Eyes::kRight);
-    fields_[eye].build(used ? (eye == 0 ? frame.left : frame.right) : cv::Mat(), whole);
-    if (!fields_[eye].seen()) return;
-    for (std::size_t level = 0; level < maps_.size(); ++level)
-      fields_[eye].transform(kBlunt, 1 << level, maps_[level][eye]);
-  });
-
-  const std::vector<Place> places = findPlaces(frame);
-  std::vector<Hypothesis> kept;
-  std::vector<Hypothesis> hypotheses;
+/// Orientations at each place, shaped to its regions.
+std::vector<PoseSearch::Hypothesis> PoseSearch::startsAtRegions(
+    const std::vector<Place>& places) const {
+  std::vector<Hypothesis> kept, hypotheses;
   for (std::size_t index = 0; index < places.size(); ++index) {
     const Eigen::Vector3d& place = places[index].point;
     hypotheses.clear();
-    // Orientations are laid out as seen along the ray to the place.
-    const Eigen::Matrix3d facing =
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), place).toRotationMatrix();
+    const Eigen::Matrix3d facing = facingTo(place);
     for (const auto& orientation : orientations_) {
       Pose pose = Pose::Identity();
       pose.translation() = place;
@@ -537,8 +531,57 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
          distinct(hypotheses, index < kLikelyPlaces ? kKeptAtLikely : kKeptElsewhere, 0.2))
       kept.push_back(hypothesis);
   }
-  if (near) {
+  return kept;
+}
+
+/// Orientations at and around each place where the eyes see a surface.
+std::vector<PoseSearch::Hypothesis> PoseSearch::startsAtSurfaces(
+    const RectifiedStereoFrame& frame) const {
+  std::vector<Eigen::Vector3d> places = surface_places_.find(frame);
+  places.resize(std::min(places.size(), kMostSurfaces));
+  std::vector<Hypothesis> kept, hypotheses;
+  const double step = kSurfaceStep * std::sqrt(shadow_.mean / M_PI);
+  for (std::size_t index = 0; index < places.size(); ++index) {
     hypotheses.clear();
+    const Eigen::Matrix3d facing = facingTo(places[index]);
+    for (const auto& orientation : orientations_)
+      for (int x = -1; x <= 1; ++x)
+        for (int y = -1; y <= 1; ++y) {
+          Pose pose = Pose::Identity();
+          pose.linear() = facing * orientation;
+          pose.translation() = places[index] + facing * Eigen::Vector3d(x * step, y * step, 0);
+          hypotheses.push_back({toParticlePose(pose), 0, kSurface + index});
+        }
+    scoreAll(hypotheses, kCoarsePoints, mapsFor(places[index].z(), 1), {});
+    for (const Hypothesis& hypothesis : distinct(hypotheses, kKeptAtSurface, 0.2))
+      kept.push_back(hypothesis);
+  }
+  return kept;
+}
+
+std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
+                                            const std::optional<Pose>& near, Where where,
+                                            const std::function<bool(const RefinedPose&)>& accept) {
+  ++calls_;
+  const cv::Rect whole(cv::Point(), camera_.size);
+  tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
+    const bool used =
+        params_.eyes == Eyes::kBoth || params_.eyes == (eye == 0 ? Eyes::kLeft : Eyes::kRight);
+    fields_[eye].build(used ? (eye == 0 ? frame.left : frame.right) : cv::Mat(), whole);
+    if (!fields_[eye].seen()) return;
+    for (std::size_t level = 0; level < maps_.size(); ++level)
+      fields_[eye].transform(kBlunt, 1 << level, maps_[level][eye]);
+  });
+
+  std::vector<Place> places;
+  std::vector<Hypothesis> kept;
+  if (where == Where::kSurfaces && params_.eyes == Eyes::kBoth) kept = startsAtSurfaces(frame);
+  if (kept.empty()) {
+    places = findPlaces(frame);
+    kept = startsAtRegions(places);
+  }
+  if (near) {
+    std::vector<Hypothesis> hypotheses;
     for (std::uint64_t i = 0; i < 3000; ++i) {
       CounterRandom random(params_.filter.seed, 7'000'000 + calls_, i);
       const auto normals = random.sixNormals();
@@ -547,7 +590,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       for (int k = 0; k < 6; ++k)
         step[k] = reach * (k < 3 ? 0.01 : 0.12) *
                   static_cast<double>(normals[static_cast<std::size_t>(k)]);
-      hypotheses.push_back({toParticlePose(movedInCamera(*near, step)), 0, places.size()});
+      hypotheses.push_back({toParticlePose(movedInCamera(*near, step)), 0, kNear});
     }
     scoreAll(hypotheses, kCoarsePoints, mapsFor(std::max(0.03, near->translation().z())), places);
     for (const Hypothesis& hypothesis : distinct(hypotheses, kKeptAtLikely, 0.1))
@@ -556,7 +599,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   if (kept.empty()) return std::nullopt;
 
   // Each of the kept moves to the best of its children, in steps that shrink.
-  const std::vector<Hypothesis> unmoved = kept;
+  std::vector<Hypothesis> unmoved = kept;
   for (int round = 0; round < kRounds; ++round) {
     const double size = std::pow(0.6, round);
     tbb::parallel_for(std::size_t{0}, kept.size(), [&](std::size_t i) {
@@ -588,16 +631,17 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
   for (std::size_t first = 0; first < kept.size();) {
     std::size_t last = first;
     while (last < kept.size() && kept[last].place == kept[first].place) ++last;
-    const bool likely = last - first > kKeptElsewhere;
-    const auto addBest = [&](const std::vector<Hypothesis>& all, std::size_t count) {
-      std::vector<Hypothesis> here(all.begin() + static_cast<std::ptrdiff_t>(first),
-                                   all.begin() + static_cast<std::ptrdiff_t>(last));
+    const std::size_t place = kept[first].place;
+    const std::size_t count = place >= kSurface && place < kNear ? kRefinedAtSurface
+                              : last - first > kKeptElsewhere    ? kRefinedAtLikely
+                                                                 : kRefinedElsewhere;
+    // Shaped ones may be better than what edges made of them.
+    for (const auto* all : {&kept, &unmoved}) {
+      std::vector<Hypothesis> here(all->begin() + static_cast<std::ptrdiff_t>(first),
+                                   all->begin() + static_cast<std::ptrdiff_t>(last));
       for (const Hypothesis& hypothesis : distinct(here, count, 0.3))
         starts.push_back(toPose(hypothesis.pose));
-    };
-    addBest(kept, likely ? kRefinedAtLikely : kRefinedElsewhere);
-    // Shaped ones may be better than what edges made of them.
-    addBest(unmoved, likely ? kUnmovedAtLikely : kUnmovedElsewhere);
+    }
     first = last;
   }
   std::vector<RefinedPose> refined(starts.size());

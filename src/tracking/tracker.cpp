@@ -82,6 +82,8 @@ constexpr double kFoundStrength = 0.1, kRefoundStrength = 0.05;  // [nats/px] li
 constexpr double kFaintStrength = 0.1;  // [nats/px] of a pose that does not last
 constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;  // [nats/px] once, and until then
 constexpr double kFoundInside = 0.3;       // share of the contour inside the images
+constexpr double kLeastEvidence = 60;      // [nats] of a start: chance brings about as much
+constexpr double kClearStrength = 0.6;     // [nats/px] of a small one that needs less
 constexpr double kCompelling = 160;        // [nats] of evidence that chance does not bring about
 constexpr double kCompelledSupport = 0.6;  // and what then is enough
 constexpr double kCompelledInside = 0.15;  // likewise
@@ -273,7 +275,10 @@ class Tracker::Impl {
       refused = refused || other;
       return accepted = !other;
     };
-    const std::optional<RefinedPose> found = search_.find(frame, last_seen_, accept);
+    // What is as bright as its surroundings makes no region.
+    const auto where =
+        frames_lost_ % 2 == 1 ? PoseSearch::Where::kSurfaces : PoseSearch::Where::kBrightRegions;
+    const std::optional<RefinedPose> found = search_.find(frame, last_seen_, where, accept);
     report_.search_ms = millisecondsSince(started);
     report_.support = found ? found->support() : 0;
     if (!accepted) {
@@ -315,6 +320,7 @@ class Tracker::Impl {
     if (found.evidence >= kCompelling)
       return found.support() >= (elsewhere ? kFoundSupport : kCompelledSupport) &&
              found.insideShare() >= kCompelledInside;
+    if (!near && found.evidence < kLeastEvidence && found.strength() < kClearStrength) return false;
     return found.support() >= (near ? kRefoundSupport : kFoundSupport) &&
            found.strength() >= (near ? kRefoundStrength : kFoundStrength) &&
            found.insideShare() >= kFoundInside;
@@ -337,8 +343,8 @@ class Tracker::Impl {
     const auto started = Clock::now();
     std::optional<RefinedPose> own;
     bool better = false;
-    const std::optional<RefinedPose> found =
-        search_.find(frame, belief_.pose, [&](const RefinedPose& candidate) {
+    const std::optional<RefinedPose> found = search_.find(
+        frame, belief_.pose, PoseSearch::Where::kBrightRegions, [&](const RefinedPose& candidate) {
           if (!own) own = search_.judge(belief_.pose);
           better = goodStart(candidate) && candidate.support() > own->support() + kOpinionSupport &&
                    candidate.log_likelihood > own->log_likelihood + kOpinionMargin &&

@@ -266,7 +266,8 @@ void search(benchmark::State& state) {
   tbb::task_arena arena(params.threads);
   timeEach(state, [&] {
     arena.execute([&] {
-      benchmark::DoNotOptimize(search.find(cube().rectified.front(), std::nullopt, all));
+      benchmark::DoNotOptimize(search.find(cube().rectified.front(), std::nullopt,
+                                           PoseSearch::Where::kBrightRegions, all));
     });
   });
 }

@@ -100,7 +100,8 @@ void countAll() {
   });
   PoseSearch search(TrackerParams(), frames.object, model, frames.camera);
   count("search", [&] {
-    search.find(frames.rectified[0], std::nullopt, [](const RefinedPose&) { return true; });
+    search.find(frames.rectified[0], std::nullopt, PoseSearch::Where::kBrightRegions,
+                [](const RefinedPose&) { return true; });
   });
 
   countFeatures();

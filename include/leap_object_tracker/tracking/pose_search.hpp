@@ -17,6 +17,7 @@
 #include "leap_object_tracker/tracking/eye_agreement.hpp"
 #include "leap_object_tracker/tracking/pose_refiner.hpp"
 #include "leap_object_tracker/tracking/shaded_view.hpp"
+#include "leap_object_tracker/tracking/surface_places.hpp"
 #include "leap_object_tracker/tracking/tracker_params.hpp"
 
 namespace leap_object_tracker {
@@ -24,11 +25,12 @@ namespace leap_object_tracker {
 /// Finds an object anywhere in the working volume, in one frame.
 ///
 /// 1. Places: stable bright regions (findBrightRegions) whose size fits the object; depth from the
-///    same region in the other eye, else from the region's area.
+///    same region in the other eye, else from the region's area. Or surfaces that both eyes see
+///    (SurfacePlaces).
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
 ///    of equivalent ones, shifted and scaled to the reach of each region in both eyes; scored by
 ///    the blunt contour likelihood and by that reach. The best are fitted to it in all six
-///    directions.
+///    directions. At a surface: the same set at and beside its place, scored by the contour alone.
 /// 3. The best ones move in random steps that shrink; before and after that they are refined on
 ///    sub-pixel edges, and ranked by their contour and by how the eyes agree on the texture inside
 ///    it (EyeAgreement).
@@ -39,11 +41,17 @@ class PoseSearch {
   PoseSearch(const TrackerParams& params, const ObjectModel& object, const ContourModel& model,
              const RectifiedStereoCamera& camera);
 
+  /// Where find() looks.
+  enum class Where {
+    kBrightRegions,  ///< what is brighter than all around it
+    kSurfaces,       ///< surfaces that both eyes see; bright regions if there are none
+  };
+
   /// @param near camera_from_object of a pose near which to look as well
   /// @param accept asked about the best pose of one place after the other, at most three
   /// @return the first pose accepted, else the best one; nothing if no place looks like the object.
   std::optional<RefinedPose> find(const RectifiedStereoFrame& frame,
-                                  const std::optional<Pose>& near,
+                                  const std::optional<Pose>& near, Where where,
                                   const std::function<bool(const RefinedPose&)>& accept);
 
   /// A pose refined and judged on the last frame as those that find() compares.
@@ -73,6 +81,8 @@ class PoseSearch {
     std::array<std::optional<BrightRegion>, 2> regions;  ///< by eye
   };
 
+  std::vector<Hypothesis> startsAtRegions(const std::vector<Place>& places) const;
+  std::vector<Hypothesis> startsAtSurfaces(const RectifiedStereoFrame& frame) const;
   std::vector<Place> findPlaces(const RectifiedStereoFrame& frame) const;
   /// Origin and rotation of the object as one eye sees them.
   std::pair<Eigen::Vector3f, Eigen::Matrix3f> seenFrom(const ParticlePose& pose,
@@ -100,7 +110,8 @@ class PoseSearch {
   PoseRefiner refiner_;
   ShadedView shaded_view_;
   EyeAgreement agreement_;
-  ShadowArea shadow_;                    ///< of the object from all sides
+  ShadowArea shadow_;  ///< of the object from all sides
+  SurfacePlaces surface_places_;
   std::vector<Eigen::Vector3d> pivots_;  ///< [m] of turned()
   std::vector<float> hull_;              ///< [m] outermost vertices: all x, y, z
   Eigen::AlignedBox2f window_;           ///< of the image, over the focal length
