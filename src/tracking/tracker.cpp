@@ -803,14 +803,16 @@ class Tracker::Impl {
     proven_ = proven_ || strength >= kProvenStrength || landmark_support >= kLandmarkSupport;
     const bool carried =
         landmark_support >= kLandmarkSupport || texture_support_ >= kTextureSupport;
-    faint_frames_ =
-        strength < kFaintStrength && !carried && !refined.hidden_eye ? faint_frames_ + 1 : 0;
+    const bool contour_alone = !carried && !refined.hidden_eye;
+    faint_frames_ = strength < kFaintStrength && contour_alone ? faint_frames_ + 1 : 0;
     const bool faint = faint_frames_ >= kPatience;
+    const bool refuted = strength < 0 && contour_alone;
     // No other body takes the place of one whose contour is all there from frame to frame.
     const bool unbroken =
         !confirming_ && !on_probation_ && weak_frames_ == 0 && report_.support >= kUnbrokenSupport;
     const bool supported =
-        !faint && (proven_ || strength >= kLeastStrength || (confirming_ && sameAsLast(refined))) &&
+        !faint && !refuted &&
+        (proven_ || strength >= kLeastStrength || (confirming_ && sameAsLast(refined))) &&
         (unbroken || !features_.contradict(refined.camera_from_object, refined.bestEyeSupport())) &&
         (report_.support >= kLeastSupport || carried ||
          (report_.support >= kLeastExactSupport && refined.residual < kExact && !confirming_));
