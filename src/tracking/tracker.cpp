@@ -68,6 +68,7 @@ constexpr double kTextureLearningSupport = 0.78;  // of a pose at which texture 
 constexpr double kLearnedError = 0.4;
 constexpr int kSettled = 4;               // such frames after a start before it is
 constexpr double kExact = 0.5;            // [px]
+constexpr double kLittleSupport = 0.45;   // which does not outweigh evidence against the pose
 constexpr double kUnbrokenSupport = 0.9;  // of a track that missing landmarks do not end
 constexpr double kNothingLeft = 0.15;     // support at which the object is lost at once
 constexpr int kPatience = 3;              // frames below it before the object counts as lost
@@ -806,7 +807,7 @@ class Tracker::Impl {
     const bool contour_alone = !carried && !refined.hidden_eye;
     faint_frames_ = strength < kFaintStrength && contour_alone ? faint_frames_ + 1 : 0;
     const bool faint = faint_frames_ >= kPatience;
-    const bool refuted = strength < 0 && contour_alone;
+    const bool refuted = strength < 0 && report_.support < kLittleSupport && contour_alone;
     // No other body takes the place of one whose contour is all there from frame to frame.
     const bool unbroken =
         !confirming_ && !on_probation_ && weak_frames_ == 0 && report_.support >= kUnbrokenSupport;
