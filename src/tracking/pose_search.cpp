@@ -54,7 +54,7 @@ constexpr float kToBeExpected = 0.65F;
 constexpr std::size_t kMostSurfaces = 40;  // where a body may be
 constexpr double kSurfaceStep = 0.35;      // of the body's size, to the poses beside such a place
 constexpr std::size_t kKeptAtSurface = 10, kRefinedAtSurface = 3;
-constexpr std::size_t kSurface = 1'000, kNear = 10'000;  // numbers of places without regions
+constexpr std::size_t kNear = 10'000;  // number of the place of the pose to look near
 constexpr EdgeKernel kBlunt{3.0F, 3.0F};
 
 /// Even set over SO(3) (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1).
@@ -540,7 +540,7 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::startsAtSurfaces(
   std::vector<Eigen::Vector3d> places = surface_places_.find(frame);
   places.resize(std::min(places.size(), kMostSurfaces));
   std::vector<Hypothesis> kept, hypotheses;
-  const double step = kSurfaceStep * std::sqrt(shadow_.mean / M_PI);
+  const double step = kSurfaceStep * surface_places_.size();
   for (std::size_t index = 0; index < places.size(); ++index) {
     hypotheses.clear();
     const Eigen::Matrix3d facing = facingTo(places[index]);
@@ -550,7 +550,7 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::startsAtSurfaces(
           Pose pose = Pose::Identity();
           pose.linear() = facing * orientation;
           pose.translation() = places[index] + facing * Eigen::Vector3d(x * step, y * step, 0);
-          hypotheses.push_back({toParticlePose(pose), 0, kSurface + index});
+          hypotheses.push_back({toParticlePose(pose), 0, index});
         }
     scoreAll(hypotheses, kCoarsePoints, mapsFor(places[index].z(), 1), {});
     for (const Hypothesis& hypothesis : distinct(hypotheses, kKeptAtSurface, 0.2))
@@ -632,9 +632,10 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     std::size_t last = first;
     while (last < kept.size() && kept[last].place == kept[first].place) ++last;
     const std::size_t place = kept[first].place;
-    const std::size_t count = place >= kSurface && place < kNear ? kRefinedAtSurface
-                              : last - first > kKeptElsewhere    ? kRefinedAtLikely
-                                                                 : kRefinedElsewhere;
+    const bool surface = places.empty() && place != kNear;
+    const std::size_t count = surface                         ? kRefinedAtSurface
+                              : last - first > kKeptElsewhere ? kRefinedAtLikely
+                                                              : kRefinedElsewhere;
     // Shaped ones may be better than what edges made of them.
     for (const auto* all : {&kept, &unmoved}) {
       std::vector<Hypothesis> here(all->begin() + static_cast<std::ptrdiff_t>(first),

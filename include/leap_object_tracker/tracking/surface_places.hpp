@@ -22,6 +22,8 @@ class SurfacePlaces {
   /// @return [m] camera frame of the left eye, at least half the body's size apart
   std::vector<Eigen::Vector3d> find(const RectifiedStereoFrame& frame) const;
 
+  double size() const { return size_; }
+
  private:
   RectifiedStereoCamera camera_;
   double nearest_, farthest_, size_;

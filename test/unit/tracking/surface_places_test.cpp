@@ -5,24 +5,16 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "drawn_box.hpp"
+
 namespace leap_object_tracker {
 namespace {
 
 constexpr double kNearest = 0.04, kFarthest = 0.6, kSize = 0.02;  // [m]
 
-RectifiedStereoCamera camera() {
-  RectifiedStereoCamera camera;
-  camera.focal_length = 200;
-  camera.center_u = 159.5;
-  camera.center_v = 119.5;
-  camera.baseline = 0.04;
-  camera.size = {320, 240};
-  return camera;
-}
-
 /// A plane speckled square that faces the eyes, before what else is in the images.
 void drawSquare(const Eigen::Vector3d& middle, double half_width, RectifiedStereoFrame& frame) {
-  const RectifiedStereoCamera eyes = camera();
+  const RectifiedStereoCamera eyes = roundCamera();
   cv::Mat speckles(24, 24, CV_8UC1);
   cv::RNG random(7);
   random.fill(speckles, cv::RNG::UNIFORM, 60, 200);
@@ -38,8 +30,8 @@ void drawSquare(const Eigen::Vector3d& middle, double half_width, RectifiedStere
 }
 
 RectifiedStereoFrame darkFrame() {
-  return {Stamp(), cv::Mat(camera().size, CV_8UC1, cv::Scalar(2)),
-          cv::Mat(camera().size, CV_8UC1, cv::Scalar(2))};
+  return {Stamp(), cv::Mat(roundCamera().size, CV_8UC1, cv::Scalar(2)),
+          cv::Mat(roundCamera().size, CV_8UC1, cv::Scalar(2))};
 }
 
 double nearestTo(const Eigen::Vector3d& middle, const std::vector<Eigen::Vector3d>& places) {
@@ -53,7 +45,7 @@ TEST(SurfacePlaces, liesBehindASurfaceThatBothEyesSee) {
        {Eigen::Vector3d(0.02, 0.01, 0.12), Eigen::Vector3d(0.05, -0.04, 0.25)}) {
     RectifiedStereoFrame frame = darkFrame();
     drawSquare(middle, kSize, frame);
-    const auto places = SurfacePlaces(camera(), kNearest, kFarthest, kSize).find(frame);
+    const auto places = SurfacePlaces(roundCamera(), kNearest, kFarthest, kSize).find(frame);
     ASSERT_FALSE(places.empty());
     EXPECT_LT(nearestTo(middle, places), kSize);
     EXPECT_GT(places.front().z(), middle.z());
@@ -65,7 +57,7 @@ TEST(SurfacePlaces, areFoundAmongBodiesThatTouchInTheImage) {
   const Eigen::Vector3d far(0.03, 0, 0.22), near(0.005, 0, 0.14);
   drawSquare(far, 2 * kSize, frame);
   drawSquare(near, kSize, frame);
-  const auto places = SurfacePlaces(camera(), kNearest, kFarthest, kSize).find(frame);
+  const auto places = SurfacePlaces(roundCamera(), kNearest, kFarthest, kSize).find(frame);
   EXPECT_LT(nearestTo(near, places), kSize);
   EXPECT_LT(nearestTo(far + Eigen::Vector3d(0.02, 0, 0), places), 1.5 * kSize);
   // No surface, no place.
@@ -73,7 +65,7 @@ TEST(SurfacePlaces, areFoundAmongBodiesThatTouchInTheImage) {
 }
 
 TEST(SurfacePlaces, needBothEyesAndSomethingToMatch) {
-  const SurfacePlaces finder(camera(), kNearest, kFarthest, kSize);
+  const SurfacePlaces finder(roundCamera(), kNearest, kFarthest, kSize);
   RectifiedStereoFrame frame = darkFrame();
   EXPECT_TRUE(finder.find(frame).empty());
   drawSquare({0.02, 0.01, 0.12}, kSize, frame);
