@@ -39,15 +39,18 @@ constexpr float kInnerRoom = 5.5F;  // [px] to the next line that this brightnes
 // [px] that are searched however close the next line is: to move a pose, and to judge it, for which
 // it does not matter which of the two an edge belongs to.
 constexpr double kCrowdedRange = 0.75, kCrowdedReach = 1.6;
-constexpr double kInnerContrast = 0.5;  // of an outline before another part of the body, likewise
-constexpr double kSureContrast = 0.25;  // of the brightest, that an edge shows without fail
-constexpr double kTextureRange = 4.5;   // [px] ranges below this look at the texture too
-constexpr double kFine = 2.6;           // [px] ranges below this are searched by fitted steps
-constexpr int kProfile = 7;             // [px] half length of a profile that steps are fitted to
-constexpr double kLargestShift = 2;     // [px] of a fitted step
-constexpr int kShortProfile = 3;        // [px] the same, beside texture
-constexpr double kTexturedNoise = 3;    // [grey levels] that a fit leaves there
-constexpr double kShortShare = 0.5;     // of which a short one must leave no more
+// [px] that a straight line has in the window of ContourLines, which gets every second point.
+constexpr double kOneLine = ContourLines::kWindow / 2;
+constexpr double kLeastExpected = 0.05;  // of the contrast, for a share of what shows
+constexpr double kInnerContrast = 0.5;   // of an outline before another part of the body, likewise
+constexpr double kSureContrast = 0.25;   // of the brightest, that an edge shows without fail
+constexpr double kTextureRange = 4.5;    // [px] ranges below this look at the texture too
+constexpr double kFine = 2.6;            // [px] ranges below this are searched by fitted steps
+constexpr int kProfile = 7;              // [px] half length of a profile that steps are fitted to
+constexpr double kLargestShift = 2;      // [px] of a fitted step
+constexpr int kShortProfile = 3;         // [px] the same, beside texture
+constexpr double kTexturedNoise = 3;     // [grey levels] that a fit leaves there
+constexpr double kShortShare = 0.5;      // of which a short one must leave no more
 // [px^2] that smoothing, slopes by differences and bilinear interpolation add to its square.
 constexpr double kSearchBlur = 1.9;
 constexpr float kIgnoredCosine = 0.6F;
@@ -122,6 +125,7 @@ struct PoseRefiner::Match {
   double offset = 0;              ///< [px] from the contour to the edge, along the normal
   double variance = 1;            ///< [px^2]
   double samples = 0;             ///< independent ones that the point stands for
+  double alone = 0;               ///< the same if no other line ran beside it
   double length = 0;              ///< [px]
   Eigen::Vector2f place, normal;  ///< [px], unit vector in the image
   float clearance = 0;            ///< [px] to the next line of the contour beside this one
@@ -143,6 +147,9 @@ struct PoseRefiner::Match {
   /// Contrast that is to be expected, 1 enough to be seen, 0 none: for what is not seen to count.
   double expected = 1;
   float region = 0;  ///< [nats/px] by which the grey values speak for an outline here
+
+  /// Weight among lines that the image does not tell apart.
+  double visibility() const { return std::max(kLeastExpected, expected); }
 };
 
 /// How far another line of the contour runs beside each: an edge between the two belongs to the
@@ -153,7 +160,7 @@ void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches)
   for (std::size_t j = first; j < matches.size(); j += 2) {
     const Match& m = matches[j];
     lines.add(m.place.x(), m.place.y(), m.normal.x(), m.normal.y(), m.step,
-              static_cast<float>(m.length));
+              static_cast<float>(m.length * m.visibility()));
   }
   for (std::size_t i = first; i < matches.size(); i += 2) {
     const ContourLines::Neighbours beside = lines.neighbours((i - first) / 2);
@@ -165,9 +172,10 @@ void PoseRefiner::findClearances(std::size_t first, std::vector<Match>& matches)
       matches[k].before = beside.before;
       matches[k].after = beside.after;
       matches[k].clearance = std::min(-beside.before, beside.after);
-      // Lines that the image does not tell apart are seen once.
-      if (beside.own > 0)
-        matches[k].samples *= static_cast<double>(std::min(1.0F, beside.own / beside.all));
+      // Lines that the image does not tell apart are seen once, most of all the one that shows
+      // best.
+      const double own = std::max(kOneLine, matches[i].length) * matches[i].visibility();
+      matches[k].samples *= std::min(1.0, own / static_cast<double>(beside.all));
       if (matches[k].limb) continue;
       matches[k].merged = middle(beside.same_moment, beside.same, ContourLines::kSameLine);
       matches[k].blended =
@@ -243,7 +251,7 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
       const Eigen::Vector3d row =
           scale * Eigen::Vector3d(normal.x(), normal.y(), -normal.x() * x - normal.y() * y);
       match.jacobian << row, arm.cross(row);
-      match.samples = std::min(1.0, match.length / kIndependentLength);
+      match.samples = match.alone = std::min(1.0, match.length / kIndependentLength);
       match.place = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
       if (point.limb > 0 && match.outline) {
         const double blur = std::sqrt(std::pow(kBlurU * normal.x(), 2) +
@@ -552,8 +560,10 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
       const double spread = std::hypot(m.outline ? kOutlineSpread : kCreaseSpread, m.crowding);
       gain = std::max(gain, 1 - 0.5 * std::pow(m.offset / spread, 2));
     }
+    // A narrow or dark face says nothing against the outline that it ends at.
+    const double heard = m.alone * (m.region < 0 ? m.expected : 1);
     result.log_likelihood +=
-        m.samples * gain + kRegionWeight * m.expected * m.samples * static_cast<double>(m.region);
+        m.samples * gain + kRegionWeight * heard * static_cast<double>(m.region);
   }
   if (found > 0) {
     result.leverage /= found;
@@ -564,7 +574,7 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
   // It is the outline that weighs them: poses that show more creases are not worse for it.
   double misfit = 0, fitted = 0, all = 0;
   for (const Match& m : matches) {
-    if (m.outline) all += m.expected * m.samples;
+    if (m.outline) all += m.expected * m.alone;
     if (m.noise <= 0) continue;
     fitted += m.samples;
     misfit += m.samples * std::log(std::clamp(m.noise, 1.0, 20.0));
@@ -580,10 +590,11 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
 }
 
 void PoseRefiner::learn(const ContourModel& model, const std::array<EdgeField, 2>& fields,
-                        const Pose& pose, Appearance& appearance) const {
+                        const Pose& pose, Appearance& appearance,
+                        const std::array<ContourView, 2>* exact) const {
   thread_local std::vector<Match> matches;
   std::array<EyeSupport, 2> eyes;
-  match(model, fields, pose, nullptr, 2.0, appearance, false, kCrowdedRange, matches, eyes);
+  match(model, fields, pose, exact, 2.0, appearance, false, kCrowdedRange, matches, eyes);
   GreyModel::Histogram inside{}, outside{};
   double bright = 0, judged = 0;
   for (const Match& m : matches) {
@@ -607,19 +618,26 @@ void PoseRefiner::learn(const ContourModel& model, const std::array<EdgeField, 2
       appearance.bright_inside + 0.1 * (bright / judged - appearance.bright_inside), 0.2, 0.95);
 }
 
+std::optional<std::array<ContourView, 2>> exactViews(const ContourModel& model,
+                                                     const Pose& camera_from_object,
+                                                     double baseline) {
+  std::array<std::optional<ContourView>, 2> views;
+  tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
+    Eigen::Vector3d origin = camera_from_object.translation();
+    if (eye == 1) origin.x() -= baseline;
+    views[eye] = model.exactView(-(camera_from_object.linear().transpose() * origin));
+  });
+  if (!views[0] || !views[1]) return std::nullopt;
+  return std::array<ContourView, 2>{*std::move(views[0]), *std::move(views[1])};
+}
+
 void refineExactly(const PoseRefiner& refiner, const ContourModel& model,
                    const std::array<EdgeField, 2>& fields, double baseline, const PosePrior& prior,
                    const Appearance& appearance, RefinedPose& refined) {
-  std::array<std::optional<ContourView>, 2> views;
-  tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
-    Eigen::Vector3d origin = refined.camera_from_object.translation();
-    if (eye == 1) origin.x() -= baseline;
-    views[eye] = model.exactView(-(refined.camera_from_object.linear().transpose() * origin));
-  });
-  if (!views[0] || !views[1]) return;
-  const std::array<ContourView, 2> exact{*std::move(views[0]), *std::move(views[1])};
-  refined = refiner.refine(model, fields, refined.camera_from_object, prior, appearance, {3, 2.5},
-                           &exact);
+  const auto exact = exactViews(model, refined.camera_from_object, baseline);
+  if (exact)
+    refined = refiner.refine(model, fields, refined.camera_from_object, prior, appearance, {3, 2.5},
+                             &*exact);
 }
 
 }  // namespace leap_object_tracker

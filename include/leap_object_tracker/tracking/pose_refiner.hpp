@@ -106,8 +106,9 @@ class PoseRefiner {
                      const Eigen::Vector2f& ignored = Eigen::Vector2f::Zero()) const;
 
   /// Takes the looks of the object at a pose that can be trusted into `appearance`.
+  /// @param exact as above
   void learn(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
-             Appearance& appearance) const;
+             Appearance& appearance, const std::array<ContourView, 2>* exact = nullptr) const;
 
  private:
   struct Match;
@@ -125,6 +126,13 @@ class PoseRefiner {
   RectifiedStereoCamera camera_;
   const LimbShift* limb_shift_;
 };
+
+/// What both eyes see of the contour at exactly this pose, where the model knows only views nearby;
+/// nothing if it knows them all.
+/// @param baseline [m] of the eyes
+std::optional<std::array<ContourView, 2>> exactViews(const ContourModel& model,
+                                                     const Pose& camera_from_object,
+                                                     double baseline);
 
 /// Refines once more on the contour of exactly this view, where the model knows only one nearby.
 /// @param baseline [m] of the eyes

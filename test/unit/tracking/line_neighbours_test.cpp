@@ -38,19 +38,27 @@ TEST(ContourLines, addUpTheStepsOfOnePlaceAlongOneNormal) {
 
 TEST(ContourLines, countWhatTheImageDoesNotTellApart) {
   ContourLines lines = upright();
+  // Pieces of 2 px at 0, +-2 and +-4 px along, which count 1, 3/4 and 1/2.
+  const float alone = 2 * (1 + 2 * 0.75F + 2 * 0.5F);
+  EXPECT_FLOAT_EQ(lines.neighbours(12).all, alone);
   const auto beside = lines.neighbours(2);
-  EXPECT_FLOAT_EQ(beside.own, 6);
-  EXPECT_GT(beside.all, 11) << "nearly two lines";
-  EXPECT_LE(beside.all, 12);
-  const auto alone = lines.neighbours(12);
-  EXPECT_FLOAT_EQ(alone.own, alone.all);
+  EXPECT_GT(beside.all, 1.85F * alone) << "nearly two lines";
+  EXPECT_LT(beside.all, 2 * alone);
+}
+
+TEST(ContourLines, onOnePlaceAreSeenOnce) {
+  ContourLines lines;
+  for (int line = 0; line < 2; ++line)
+    for (int k = 0; k < 9; ++k) lines.add(10, 2.0F * static_cast<float>(k), 1, 0, -2, 2);
+  // A line without end has the whole window.
+  EXPECT_FLOAT_EQ(lines.neighbours(4).all, 2 * ContourLines::kWindow);
 }
 
 TEST(ContourLines, doNotMeetThoseOfAnotherDirection) {
   ContourLines lines;
   lines.add(0, 0, 1, 0, -1, 2);
   lines.add(1, 0, 0, 1, -1, 2);
-  lines.add(2, 6, 1, 0, -1, 2);  // too far along
+  lines.add(2, 9, 1, 0, -1, 2);  // too far along
   const auto beside = lines.neighbours(0);
   EXPECT_FLOAT_EQ(beside.after, ContourLines::kFarthest);
   EXPECT_FLOAT_EQ(beside.all, 2);
