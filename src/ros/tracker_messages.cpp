@@ -65,6 +65,7 @@ TrackerStatusPtr statusMessage(const TrackerReport& report, const std_msgs::Head
   }
   message->object = object;
   message->support = report.support;
+  message->unclear = report.unclear;
   message->effective_share = report.effective_share;
   message->particles = static_cast<std::uint32_t>(report.particles);
   message->edges_ms = report.edges_ms;

@@ -155,6 +155,9 @@ class TrackerNodelet : public nodelet::Nodelet {
     status->age = (ros::Time::now() - header.stamp).toSec();
     status->dropped = subscriber_->dropped();
     status_publisher_.publish(status);
+    if (status->unclear)
+      NODELET_INFO_STREAM_THROTTLE(
+          5, "sees '" << object_.name << "', but not which way it is turned: no pose yet");
     const bool shown = tracker_->report().state == TrackerState::kTracking;
     if (shown == mesh_shown_) return;
     mesh_shown_ = shown;

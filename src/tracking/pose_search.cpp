@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
@@ -47,6 +48,9 @@ constexpr double kLeastInImages = 0.1;    // of the contour of a pose
 constexpr double kHopelessToMove = 0.2;   // the same, of a pose not refined to the end
 constexpr std::size_t kExactlySeen = 8;   // of the turned poses that are compared at last
 constexpr double kShadedReach = 60;       // [nats] by which their contour may be worse
+constexpr double kSame = 0.05;            // [rad], and of the radius, of poses that are the same
+constexpr double kApartTurn = M_PI / 18;  // [rad] of poses that differ for sure
+constexpr double kApart = 0.01;           // [m]
 constexpr float kIndependentShare = 1 / 3.0F;  // samples per pixel of contour
 // Of the best score that so much contour could have: less speaks against a pose. Without it, views
 // that show more contour would win.
@@ -559,9 +563,8 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::startsAtSurfaces(
   return kept;
 }
 
-std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
-                                            const std::optional<Pose>& near, Where where,
-                                            const std::function<bool(const RefinedPose&)>& accept) {
+std::optional<FoundPose> PoseSearch::find(const RectifiedStereoFrame& frame, const Query& query,
+                                          const std::function<bool(const FoundPose&)>& enough) {
   ++calls_;
   const cv::Rect whole(cv::Point(), camera_.size);
   tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
@@ -575,12 +578,14 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
 
   std::vector<Place> places;
   std::vector<Hypothesis> kept;
-  if (where == Where::kSurfaces && params_.eyes == Eyes::kBoth) kept = startsAtSurfaces(frame);
+  if (query.where == Where::kSurfaces && params_.eyes == Eyes::kBoth)
+    kept = startsAtSurfaces(frame);
   if (kept.empty()) {
     places = findPlaces(frame);
     kept = startsAtRegions(places);
   }
-  if (near) {
+  if (query.near) {
+    const Pose& near = *query.near;
     std::vector<Hypothesis> hypotheses;
     for (std::uint64_t i = 0; i < 3000; ++i) {
       CounterRandom random(params_.filter.seed, 7'000'000 + calls_, i);
@@ -590,13 +595,13 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       for (int k = 0; k < 6; ++k)
         step[k] = reach * (k < 3 ? 0.01 : 0.12) *
                   static_cast<double>(normals[static_cast<std::size_t>(k)]);
-      hypotheses.push_back({toParticlePose(movedInCamera(*near, step)), 0, kNear});
+      hypotheses.push_back({toParticlePose(movedInCamera(near, step)), 0, kNear});
     }
-    scoreAll(hypotheses, kCoarsePoints, mapsFor(std::max(0.03, near->translation().z())), places);
+    scoreAll(hypotheses, kCoarsePoints, mapsFor(std::max(0.03, near.translation().z())), places);
     for (const Hypothesis& hypothesis : distinct(hypotheses, kKeptAtLikely, 0.1))
       kept.push_back(hypothesis);
   }
-  if (kept.empty()) return std::nullopt;
+  if (kept.empty() && query.candidates.empty()) return std::nullopt;
 
   // Each of the kept moves to the best of its children, in steps that shrink.
   std::vector<Hypothesis> unmoved = kept;
@@ -645,6 +650,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     }
     first = last;
   }
+  starts.insert(starts.end(), query.candidates.begin(), query.candidates.end());
   std::vector<RefinedPose> refined(starts.size());
   const auto better = [](const RefinedPose& a, const RefinedPose& b) {
     return a.evidence > b.evidence;
@@ -673,7 +679,7 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
     compareEyes(refined[i]);
   });
   std::sort(refined.begin(), refined.end(), better);
-  std::optional<RefinedPose> best;
+  std::optional<FoundPose> best;
   std::vector<Eigen::Vector3d> asked;
   for (const RefinedPose& candidate : refined) {
     const Eigen::Vector3d place = candidate.camera_from_object.translation();
@@ -688,14 +694,14 @@ std::optional<RefinedPose> PoseSearch::find(const RectifiedStereoFrame& frame,
       if (&other != &candidate && other.support() >= kHopelessSupport &&
           (place - other.camera_from_object.translation()).norm() < model_->radius())
         rivals.push_back(other.camera_from_object);
-    const RefinedPose settled = bestTurned(candidate, rivals);
-    const double depth = settled.camera_from_object.translation().z();
+    const FoundPose found = bestTurned(candidate, rivals);
+    const double depth = found.refined.camera_from_object.translation().z();
     if (depth < params_.volume.nearest || depth > params_.volume.farthest) continue;
-    if (accept(settled)) return settled;
-    if (!best) best = settled;
+    if (enough(found)) return found;
+    if (!best) best = found;
     if (asked.size() >= kAsked) break;
   }
-  return best ? best : std::optional<RefinedPose>(refined.front());
+  return best ? *best : FoundPose{refined.front()};
 }
 
 /// Best first, none of them within `apart` [rad] of a better one.
@@ -738,9 +744,24 @@ void PoseSearch::toAgreeingDepth(RefinedPose& refined) const {
     refined.camera_from_object.translation() /= growth;
 }
 
+/// Refines and judges a pose with the looks that it shows itself, on the contour of exactly its
+/// view.
+void PoseSearch::settle(RefinedPose& refined) const {
+  const auto exact = exactViews(*model_, refined.camera_from_object, camera_.baseline);
+  const std::array<ContourView, 2>* views = exact ? &*exact : nullptr;
+  Appearance looks;
+  refiner_.learn(*model_, fields_, refined.camera_from_object, looks, views);
+  refined =
+      refiner_.refine(*model_, fields_, refined.camera_from_object, {}, looks, {3, 2.5}, views);
+}
+
 /// A body that looks nearly the same turned over or round may have been taken for it: the best of
 /// the pose and its turned ones.
-RefinedPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Pose>& rivals) const {
+FoundPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Pose>& rivals) const {
+  const auto same = [&](const Pose& a, const Pose& b) {
+    return (a.translation() - b.translation()).norm() < kSame * model_->radius() &&
+           angleBetween(a.linear(), b.linear(), symmetry_) < kSame;
+  };
   std::vector<Hypothesis> hypotheses;
   for (const Pose& other : turned(pose.camera_from_object))
     hypotheses.push_back({toParticlePose(other), 0, 0});
@@ -751,12 +772,14 @@ RefinedPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Po
     starts.push_back(toPose(hypothesis.pose));
   starts.push_back(pose.camera_from_object);
   for (const Pose& rival : rivals) {
-    if (std::none_of(starts.begin(), starts.end(), [&](const Pose& known) {
-          return (rival.translation() - known.translation()).norm() < 0.05 * model_->radius() &&
-                 angleBetween(rival.linear(), known.linear(), symmetry_) < 0.05;
-        }))
+    if (std::none_of(starts.begin(), starts.end(),
+                     [&](const Pose& known) { return same(rival, known); }))
       starts.push_back(rival);
   }
+  const auto differ = [&](const Pose& a, const Pose& b) {
+    return (a.translation() - b.translation()).norm() > kApart ||
+           angleBetween(a.linear(), b.linear(), symmetry_) > kApartTurn;
+  };
   std::vector<RefinedPose> refined(starts.size());
   std::vector<Appearance> looks(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
@@ -766,19 +789,21 @@ RefinedPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Po
     refined[i] =
         refiner_.refine(*model_, fields_, refined[i].camera_from_object, {}, looks[i], {3, 2.5});
   });
-  std::vector<std::size_t> order(starts.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::vector<std::size_t> ranked(starts.size()), order;
+  std::iota(ranked.begin(), ranked.end(), std::size_t{0});
   const auto likelier = [&](std::size_t a, std::size_t b) {
     return refined[a].log_likelihood > refined[b].log_likelihood;
   };
-  const std::size_t last_round = std::min(kExactlySeen, order.size());
-  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(last_round),
-                    order.end(), likelier);
-  order.resize(last_round);
-  tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) {
-    refineExactly(refiner_, *model_, fields_, camera_.baseline, {}, looks[order[i]],
-                  refined[order[i]]);
-  });
+  std::sort(ranked.begin(), ranked.end(), likelier);
+  for (const std::size_t i : ranked) {
+    if (order.size() >= kExactlySeen) break;
+    if (std::none_of(order.begin(), order.end(), [&](std::size_t known) {
+          return same(refined[i].camera_from_object, refined[known].camera_from_object);
+        }))
+      order.push_back(i);
+  }
+  tbb::parallel_for(std::size_t{0}, order.size(),
+                    [&](std::size_t i) { settle(refined[order[i]]); });
   // Shading decides between those that the contour leaves.
   const double best =
       refined[*std::min_element(order.begin(), order.end(), likelier)].log_likelihood;
@@ -790,8 +815,18 @@ RefinedPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Po
     RefinedPose& pose_there = refined[order[i]];
     pose_there.log_likelihood += shaded_view_.logLikelihood(fields_, pose_there.camera_from_object);
   });
-  RefinedPose& likeliest = refined[*std::min_element(order.begin(), order.end(), likelier)];
-  compareEyes(likeliest);
+  FoundPose likeliest{refined[*std::min_element(order.begin(), order.end(), likelier)],
+                      {},
+                      std::numeric_limits<double>::infinity()};
+  for (const std::size_t i : order) {
+    const double lead = likeliest.refined.log_likelihood - refined[i].log_likelihood;
+    if (lead < likeliest.lead &&
+        differ(refined[i].camera_from_object, likeliest.refined.camera_from_object)) {
+      likeliest.lead = lead;
+      likeliest.rival = refined[i].camera_from_object;
+    }
+  }
+  compareEyes(likeliest.refined);
   return likeliest;
 }
 
@@ -804,7 +839,7 @@ RefinedPose PoseSearch::judge(const Pose& camera_from_object) const {
   refiner_.learn(*model_, fields_, camera_from_object, looks);
   RefinedPose refined =
       refiner_.refine(*model_, fields_, camera_from_object, {}, looks, {4, 3, 2.5});
-  refineExactly(refiner_, *model_, fields_, camera_.baseline, {}, looks, refined);
+  settle(refined);
   refined.log_likelihood += shaded_view_.logLikelihood(fields_, refined.camera_from_object);
   return refined;
 }

@@ -85,6 +85,8 @@ constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;  // [nats/px] once
 constexpr double kFoundInside = 0.3;       // share of the contour inside the images
 constexpr double kLeastEvidence = 60;      // [nats] of a start: chance brings about as much
 constexpr double kClearStrength = 0.6;     // [nats/px] of a small one that needs less
+constexpr double kSameSurface = 0.1;       // of the radius, by which a body may differ from itself
+constexpr double kClearLead = 20;          // [nats] of a start over the same body turned otherwise
 constexpr double kCompelling = 160;        // [nats] of evidence that chance does not bring about
 constexpr double kCompelledSupport = 0.6;  // and what then is enough
 constexpr double kCompelledInside = 0.15;  // likewise
@@ -166,6 +168,7 @@ class Tracker::Impl {
 
   void search() {
     report_.state = TrackerState::kSearching;
+    unclear_.clear();
     remembered_.reset();
     last_found_.reset();
     last_stamp_.reset();
@@ -200,6 +203,7 @@ class Tracker::Impl {
   std::optional<PoseEstimate> trackInArena(const RectifiedStereoFrame& frame,
                                            const std::optional<Pose>& fixed_from_camera) {
     report_.edges_ms = report_.filter_ms = report_.search_ms = 0;
+    report_.unclear = false;
     if (report_.state == TrackerState::kIdle) return std::nullopt;
 
     Pose camera_motion = cameraMotion(fixed_from_camera);
@@ -266,22 +270,29 @@ class Tracker::Impl {
     std::optional<Pose> known;
     bool accepted = false, refused = false;
     const bool unconfirmed = anew_ && features_.unsure();
-    const auto accept = [&](const RefinedPose& candidate) {
-      if (!goodStart(candidate)) return false;
-      const Pose pose = asLastSeen(candidate.camera_from_object);
+    const auto enough = [&](const FoundPose& candidate) {
+      if (!goodStart(candidate.refined)) return false;
+      const Pose pose = asLastSeen(candidate.refined.camera_from_object);
       const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
       known = features_.absolute(frame, regions(belief), pose);
       const bool other = !known && last_seen_ && !unconfirmed &&
                          !fastSinceFound(pose, frame.stamp) && features_.refuse(pose);
       refused = refused || other;
-      return accepted = !other;
+      // The object is there, but nobody knows which way: until it shows, there is no pose.
+      accepted = !other && (known || isClear(candidate) || sameAsLast(candidate.refined));
+      report_.unclear = !other && !accepted;
+      if (report_.unclear) unclear_ = {candidate.refined.camera_from_object, *candidate.rival};
+      return !other;
     };
     // What is as bright as its surroundings makes no region.
-    const auto where =
-        frames_lost_ % 2 == 1 ? PoseSearch::Where::kSurfaces : PoseSearch::Where::kBrightRegions;
-    const std::optional<RefinedPose> found = search_.find(frame, last_seen_, where, accept);
+    PoseSearch::Query query;
+    if (frames_lost_ % 2 == 1) query.where = PoseSearch::Where::kSurfaces;
+    query.near = last_seen_;
+    for (const Pose& pose : unclear_) query.candidates.push_back(camera_motion * pose);
+    unclear_.clear();
+    const std::optional<FoundPose> found = search_.find(frame, query, enough);
     report_.search_ms = millisecondsSince(started);
-    report_.support = found ? found->support() : 0;
+    report_.support = found ? found->refined.support() : 0;
     if (!accepted) {
       if (refused) features_.countRefusal();
       if (++frames_lost_ > kNearFrames)
@@ -290,15 +301,15 @@ class Tracker::Impl {
     }
     // Another body may look the same: one that was tracked before must be seen better, or in the
     // same place.
-    const bool same = sameAsLast(*found), first = !remembered_;
+    const RefinedPose& start = found->refined;
+    const bool same = sameAsLast(start), first = !remembered_;
     found_sure_ =
-        same ||
-        (report_.support >= kSureStart &&
-         (first || (found->evidence >= kCompelling && found->strength() >= kProvenStrength)));
+        same || (report_.support >= kSureStart &&
+                 (first || (start.evidence >= kCompelling && start.strength() >= kProvenStrength)));
     on_probation_ = found_sure_ && !same && !first;
     anew_ = !known && (!last_seen_ || unconfirmed);
-    takeUp(known.value_or(asLastSeen(found->camera_from_object)), frame.stamp, known.has_value());
-    beginLooks(std::clamp(found->bright_inside, 0.3, 0.9));
+    takeUp(known.value_or(asLastSeen(start.camera_from_object)), frame.stamp, known.has_value());
+    beginLooks(std::clamp(start.bright_inside, 0.3, 0.9));
     search_.learn(belief_.pose, appearance_);
   }
 
@@ -327,6 +338,17 @@ class Tracker::Impl {
            found.insideShare() >= kFoundInside;
   }
 
+  /// Whether the image tells a found pose from those in which the body would be elsewhere.
+  bool isClear(const FoundPose& found) const {
+    if (found.lead >= kClearLead) return true;
+    const Pose turn = found.refined.camera_from_object.inverse() * *found.rival;
+    const double slack = kSameSurface * model_.radius();
+    return std::all_of(
+        object_.mesh.vertices.begin(), object_.mesh.vertices.end(), [&](const auto& vertex) {
+          return std::abs(features_.distance()((turn * vertex).template cast<float>())) < slack;
+        });
+  }
+
   Pose asLastSeen(const Pose& pose) const {
     return last_seen_ ? nearestEquivalent(pose, *last_seen_, object_.symmetry) : pose;
   }
@@ -344,17 +366,21 @@ class Tracker::Impl {
     const auto started = Clock::now();
     std::optional<RefinedPose> own;
     bool better = false;
-    const std::optional<RefinedPose> found = search_.find(
-        frame, belief_.pose, PoseSearch::Where::kBrightRegions, [&](const RefinedPose& candidate) {
+    PoseSearch::Query query;
+    query.near = belief_.pose;
+    const std::optional<FoundPose> found =
+        search_.find(frame, query, [&](const FoundPose& candidate) {
           if (!own) own = search_.judge(belief_.pose);
-          better = goodStart(candidate) && candidate.support() > own->support() + kOpinionSupport &&
-                   candidate.log_likelihood > own->log_likelihood + kOpinionMargin &&
-                   !features_.refuse(candidate.camera_from_object);
+          const RefinedPose& other = candidate.refined;
+          better = goodStart(other) && isClear(candidate) &&
+                   other.support() > own->support() + kOpinionSupport &&
+                   other.log_likelihood > own->log_likelihood + kOpinionMargin &&
+                   !features_.refuse(other.camera_from_object);
           return better;
         });
     report_.search_ms = millisecondsSince(started);
     if (!better) return;
-    takeUp(asLastSeen(found->camera_from_object), frame.stamp, false);
+    takeUp(asLastSeen(found->refined.camera_from_object), frame.stamp, false);
     report_.state = TrackerState::kLost;
   }
 
@@ -893,6 +919,7 @@ class Tracker::Impl {
   bool anew_ = false;          ///< found from nothing, not in an orientation that landmarks know
   std::optional<Pose> last_seen_;   ///< where the object was when the tracker stood by it
   std::optional<Pose> remembered_;  ///< the same, for as long as it takes
+  std::vector<Pose> unclear_;       ///< that the last frame did not tell apart
   struct Found {
     Stamp stamp;
     Pose camera_from_object;

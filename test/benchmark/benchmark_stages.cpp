@@ -262,13 +262,11 @@ void search(benchmark::State& state) {
   params.threads = static_cast<int>(state.range(0));
   const ContourModel model(cube().object, params.contour.points, params.contour.edge_radius);
   PoseSearch search(params, cube().object, model, cube().camera);
-  const auto all = [](const RefinedPose&) { return true; };
+  const auto all = [](const FoundPose&) { return true; };
   tbb::task_arena arena(params.threads);
   timeEach(state, [&] {
-    arena.execute([&] {
-      benchmark::DoNotOptimize(search.find(cube().rectified.front(), std::nullopt,
-                                           PoseSearch::Where::kBrightRegions, all));
-    });
+    arena.execute(
+        [&] { benchmark::DoNotOptimize(search.find(cube().rectified.front(), {}, all)); });
   });
 }
 BENCHMARK(search)->ArgName("threads")->Arg(1)->Arg(2)->UseManualTime();

@@ -99,10 +99,8 @@ void countAll() {
     refiner.refine(model, seen.fields(), start, {}, Appearance(), {6, 4, 2.5});
   });
   PoseSearch search(TrackerParams(), frames.object, model, frames.camera);
-  count("search", [&] {
-    search.find(frames.rectified[0], std::nullopt, PoseSearch::Where::kBrightRegions,
-                [](const RefinedPose&) { return true; });
-  });
+  count("search",
+        [&] { search.find(frames.rectified[0], {}, [](const FoundPose&) { return true; }); });
 
   countFeatures();
   countTracker("tracker, 1000 particles", frames);

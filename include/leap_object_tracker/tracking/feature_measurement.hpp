@@ -68,6 +68,7 @@ class FeatureMeasurement {
 
   const std::vector<StereoFeature>& features() const { return features_; }
   const FeatureExtractor::Counts& counts() const { return extractor_.counts(); }
+  const SignedDistance& distance() const { return distance_; }
   LandmarkMap& landmarks() { return landmarks_; }
   const LandmarkMap& landmarks() const { return landmarks_; }
 

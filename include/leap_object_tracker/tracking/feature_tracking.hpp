@@ -76,6 +76,7 @@ class FeatureTracking {
   void countRefusal();
 
   const LandmarkMap& landmarks() const { return measurement_.landmarks(); }
+  const SignedDistance& distance() const { return measurement_.distance(); }
 
  private:
   double spotSigma(const PoseBelief& belief) const;

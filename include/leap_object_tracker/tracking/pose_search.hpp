@@ -22,6 +22,15 @@
 
 namespace leap_object_tracker {
 
+/// A pose that was searched for.
+struct FoundPose {
+  RefinedPose refined;
+  std::optional<Pose> rival;  ///< the likeliest there that is more than 10 deg or 10 mm away
+  /// [nats] by which it is less likely, infinite without one: little of a body that looks nearly
+  /// the same another way.
+  double lead = 0;
+};
+
 /// Finds an object anywhere in the working volume, in one frame.
 ///
 /// 1. Places: stable bright regions (findBrightRegions) whose size fits the object; depth from the
@@ -35,7 +44,7 @@ namespace leap_object_tracker {
 ///    sub-pixel edges, and ranked by their contour and by how the eyes agree on the texture inside
 ///    it (EyeAgreement).
 /// 4. The best of each place, its turned ones and what else was found there are compared on the
-///    contour of their exact views.
+///    contour of their exact views and by their shading.
 class PoseSearch {
  public:
   PoseSearch(const TrackerParams& params, const ObjectModel& object, const ContourModel& model,
@@ -47,12 +56,18 @@ class PoseSearch {
     kSurfaces,       ///< surfaces that both eyes see; bright regions if there are none
   };
 
-  /// @param near camera_from_object of a pose near which to look as well
-  /// @param accept asked about the best pose of one place after the other, at most three
-  /// @return the first pose accepted, else the best one; nothing if no place looks like the object.
-  std::optional<RefinedPose> find(const RectifiedStereoFrame& frame,
-                                  const std::optional<Pose>& near, Where where,
-                                  const std::function<bool(const RefinedPose&)>& accept);
+  struct Query {
+    Where where = Where::kBrightRegions;
+    std::optional<Pose> near;      ///< camera_from_object near which to look as well
+    std::vector<Pose> candidates;  ///< likewise, to be compared with what is found
+  };
+
+  /// @param enough asked about the best pose of one place after the other, at most three: whether
+  /// to look no further
+  /// @return the pose at which it said so, else the best one; nothing if no place looks like the
+  /// object.
+  std::optional<FoundPose> find(const RectifiedStereoFrame& frame, const Query& query,
+                                const std::function<bool(const FoundPose&)>& enough);
 
   /// A pose refined and judged on the last frame as those that find() compares.
   RefinedPose judge(const Pose& camera_from_object) const;
@@ -99,7 +114,8 @@ class PoseSearch {
   double reachOf(const Pose& pose) const;
   void compareEyes(RefinedPose& refined) const;
   void toAgreeingDepth(RefinedPose& refined) const;
-  RefinedPose bestTurned(const RefinedPose& pose, const std::vector<Pose>& rivals) const;
+  void settle(RefinedPose& refined) const;
+  FoundPose bestTurned(const RefinedPose& pose, const std::vector<Pose>& rivals) const;
   void scoreAll(std::vector<Hypothesis>& hypotheses, int points, const std::array<GainMap, 2>& maps,
                 const std::vector<Place>& places) const;
   const std::array<GainMap, 2>& mapsFor(double depth, int sharpening = 0) const;

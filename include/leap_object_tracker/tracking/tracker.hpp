@@ -39,6 +39,7 @@ struct TrackerReport {
   double effective_share = 0;  ///< effective sample size / particles, 0 to 1
   int particles = 0;           ///< scored in the last layer
   double support = 0;          ///< as in PoseEstimate, also while not tracking
+  bool unclear = false;        ///< seen, but not which way it is turned: no pose until that shows
   double edges_ms = 0;         ///< edges and distance transforms
   double filter_ms = 0;        ///< prediction, scoring, resampling, refinement
   double search_ms = 0;        ///< looking for the object, zero while tracking

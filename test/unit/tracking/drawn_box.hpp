@@ -70,6 +70,35 @@ inline Pose poseAt(double x, double y, double z) {
   return pose;
 }
 
+/// A body with one square side, which hides all the rest of it from the eyes; none of its turns
+/// brings it upon itself.
+inline ObjectModel squareFaced() {
+  ObjectModel object;
+  object.name = "square-faced";
+  object.shape = Shape::kMesh;
+  object.mesh.vertices = {{-0.02, -0.02, -0.01}, {0.02, -0.02, -0.01},  {0.02, 0.02, -0.01},
+                          {-0.02, 0.02, -0.01},  {-0.01, -0.018, 0.02}, {0.004, -0.018, 0.02},
+                          {0.004, 0.006, 0.02},  {-0.01, 0.006, 0.02}};
+  const auto side = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
+    object.mesh.triangles.push_back({a, b, c});
+    object.mesh.triangles.push_back({a, c, d});
+  };
+  side(0, 3, 2, 1);
+  side(4, 5, 6, 7);
+  side(0, 1, 5, 4);
+  side(1, 2, 6, 5);
+  side(2, 3, 7, 6);
+  side(3, 0, 4, 7);
+  return object;
+}
+
+/// Its square side looks at the eyes.
+inline Pose facing() {
+  Pose pose = Pose::Identity();
+  pose.translation() << 0.02, 0.003, 0.12;
+  return pose;
+}
+
 /// Aslant beside the axis: three sides of a box show.
 inline Pose aslant() {
   Pose pose = poseAt(0.02, 0, 0.16);

@@ -20,11 +20,12 @@ class SearchedBox : public ::testing::TestWithParam<PoseSearch::Where> {
   void expectFound() {
     const ContourModel model(object_, TrackerParams().contour.points);
     PoseSearch search(TrackerParams(), object_, model, camera_);
-    const auto found = search.find(
-        frame_, std::nullopt, GetParam(),
-        [this](const RefinedPose& pose) { return pose.support() > 0.7 && pose.evidence > 60; });
+    const auto found = search.find(frame_, {GetParam(), {}, {}}, [](const FoundPose& pose) {
+      return pose.refined.support() > 0.7 && pose.refined.evidence > 60;
+    });
     ASSERT_TRUE(found);
-    const Pose& pose = found->camera_from_object;
+    EXPECT_GT(found->lead, 20) << "no other way to turn it";
+    const Pose& pose = found->refined.camera_from_object;
     EXPECT_LT((pose.translation() - truth_.translation()).norm(), 0.002);
     EXPECT_LT(angleBetween(pose.linear(), truth_.linear(), object_.symmetry), 0.05);
   }
@@ -46,6 +47,30 @@ TEST_P(SearchedBox, isFoundBetweenFingersThatTouchIt) {
 INSTANTIATE_TEST_SUITE_P(EitherWay, SearchedBox,
                          ::testing::Values(PoseSearch::Where::kBrightRegions,
                                            PoseSearch::Where::kSurfaces));
+
+TEST(SearchedSquare, hasARivalWhereTurnedItLooksTheSame) {
+  const ObjectModel object = squareFaced();
+  const RectifiedStereoCamera camera = roundCamera();
+  const ContourModel model(object, TrackerParams().contour.points);
+  const RectifiedStereoFrame frame = drawnFrame(object, facing(), camera);
+  PoseSearch search(TrackerParams(), object, model, camera);
+  const auto any = [](const FoundPose&) { return true; };
+  const auto found = search.find(frame, {}, any);
+  ASSERT_TRUE(found);
+  EXPECT_GT(found->refined.support(), 0.9);
+  EXPECT_LT(found->lead, 5);
+  ASSERT_TRUE(found->rival);
+  const Pose& best = found->refined.camera_from_object;
+  const double apart = angleBetween(found->rival->linear(), best.linear(), object.symmetry);
+  EXPECT_NEAR(std::remainder(apart, M_PI / 2), 0, 0.05);
+  EXPECT_GT(apart, 1);
+
+  // What it is told of is compared as well.
+  const auto again =
+      search.find(frame, {PoseSearch::Where::kSurfaces, {}, {best, *found->rival}}, any);
+  ASSERT_TRUE(again);
+  EXPECT_LT(again->lead, 5);
+}
 
 }  // namespace
 }  // namespace leap_object_tracker

@@ -87,6 +87,41 @@ TEST(NearBox, isFoundThoughTheBorderCutsIt) {
   EXPECT_EQ(found, kPoses);
 }
 
+TEST(TurningBody, hasNoPoseUntilItShowsWhichWayItIsTurned) {
+  const ObjectModel object = squareFaced();
+  const RectifiedStereoCamera camera = roundCamera();
+  Tracker tracker(TrackerParams(), object, camera);
+  tracker.search();
+  Pose truth = facing();
+  for (int frame = 0; frame < 6; ++frame) {
+    EXPECT_FALSE(tracker.track(drawnFrame(object, truth, camera, 1 + frame / 40.0))) << frame;
+    EXPECT_TRUE(tracker.report().unclear) << frame;
+    EXPECT_EQ(tracker.report().state, TrackerState::kSearching) << frame;
+  }
+  truth.linear() = rotationFromVector({0.9, 0.9, 0});
+  std::optional<PoseEstimate> estimate;
+  for (int frame = 6; frame < 9; ++frame)
+    estimate = tracker.track(drawnFrame(object, truth, camera, 1 + frame / 40.0));
+  ASSERT_TRUE(estimate);
+  EXPECT_FALSE(tracker.report().unclear);
+  EXPECT_LT(angleBetween(estimate->camera_from_object.linear(), truth.linear(), object.symmetry),
+            0.1);
+}
+
+TEST(BoxOfUntoldSymmetry, isFoundInOneOfItsEqualPoses) {
+  ObjectModel object = box(0.03, 0.04, 0.05);
+  const Symmetry symmetry = object.symmetry;
+  object.symmetry = {};
+  const RectifiedStereoCamera camera = roundCamera();
+  Tracker tracker(TrackerParams(), object, camera);
+  tracker.search();
+  std::optional<PoseEstimate> estimate;
+  for (int frame = 0; frame < 3; ++frame)
+    estimate = tracker.track(drawnFrame(object, aslant(), camera, 1 + frame / 40.0));
+  ASSERT_TRUE(estimate);
+  EXPECT_LT(angleBetween(estimate->camera_from_object.linear(), aslant().linear(), symmetry), 0.1);
+}
+
 TEST_F(MovingBox, isGivenUpWhenItIsGoneAndFoundAgain) {
   Tracker tracker(TrackerParams(), object_, camera_);
   tracker.start(truthAt(0));
