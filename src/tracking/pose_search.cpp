@@ -701,7 +701,7 @@ std::optional<FoundPose> PoseSearch::find(const RectifiedStereoFrame& frame, con
     if (!best) best = found;
     if (asked.size() >= kAsked) break;
   }
-  return best ? *best : FoundPose{refined.front()};
+  return best ? *best : FoundPose{refined.front(), {}, 0};
 }
 
 /// Best first, none of them within `apart` [rad] of a better one.
