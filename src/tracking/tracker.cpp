@@ -343,10 +343,11 @@ class Tracker::Impl {
     if (found.lead >= kClearLead) return true;
     const Pose turn = found.refined.camera_from_object.inverse() * *found.rival;
     const double slack = kSameSurface * model_.radius();
-    return std::all_of(
-        object_.mesh.vertices.begin(), object_.mesh.vertices.end(), [&](const auto& vertex) {
-          return std::abs(features_.distance()((turn * vertex).template cast<float>())) < slack;
-        });
+    return std::all_of(object_.mesh.vertices.begin(), object_.mesh.vertices.end(),
+                       [&](const Eigen::Vector3d& vertex) {
+                         return std::abs(features_.distance()((turn * vertex).cast<float>())) <
+                                slack;
+                       });
   }
 
   Pose asLastSeen(const Pose& pose) const {
