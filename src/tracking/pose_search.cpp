@@ -704,6 +704,12 @@ std::optional<FoundPose> PoseSearch::find(const RectifiedStereoFrame& frame, con
   return best ? *best : FoundPose{refined.front(), {}, 0};
 }
 
+/// @param apart [rad], and of the body's radius
+bool PoseSearch::areWithin(double apart, const Pose& a, const Pose& b) const {
+  return (a.translation() - b.translation()).norm() < apart * model_->radius() &&
+         angleBetween(a.linear(), b.linear(), symmetry_) < apart;
+}
+
 /// Best first, none of them within `apart` [rad] of a better one.
 std::vector<PoseSearch::Hypothesis> PoseSearch::distinct(std::vector<Hypothesis>& hypotheses,
                                                          std::size_t count, double apart) const {
@@ -716,8 +722,7 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::distinct(std::vector<Hypothesis>
   for (std::size_t i = 0; i < looked_at && kept.size() < count; ++i) {
     const Pose pose = toPose(hypotheses[i].pose);
     const bool known = std::any_of(poses.begin(), poses.end(), [&](const Pose& other) {
-      return (pose.translation() - other.translation()).norm() < apart * model_->radius() &&
-             angleBetween(pose.linear(), other.linear(), symmetry_) < apart;
+      return areWithin(apart, pose, other);
     });
     if (known) continue;
     poses.push_back(pose);
@@ -744,24 +749,24 @@ void PoseSearch::toAgreeingDepth(RefinedPose& refined) const {
     refined.camera_from_object.translation() /= growth;
 }
 
-/// Refines and judges a pose with the looks that it shows itself, on the contour of exactly its
-/// view.
+/// Refines and judges a pose by the looks that it shows itself: what is object and what is not,
+/// each pose says for itself.
+RefinedPose PoseSearch::refineByOwnLooks(const Pose& pose, const std::vector<double>& ranges,
+                                         const std::array<ContourView, 2>* exact) const {
+  Appearance looks;
+  refiner_.learn(*model_, fields_, pose, looks, exact);
+  return refiner_.refine(*model_, fields_, pose, {}, looks, ranges, exact);
+}
+
+/// The same on the contour of exactly its view.
 void PoseSearch::settle(RefinedPose& refined) const {
   const auto exact = exactViews(*model_, refined.camera_from_object, camera_.baseline);
-  const std::array<ContourView, 2>* views = exact ? &*exact : nullptr;
-  Appearance looks;
-  refiner_.learn(*model_, fields_, refined.camera_from_object, looks, views);
-  refined =
-      refiner_.refine(*model_, fields_, refined.camera_from_object, {}, looks, {3, 2.5}, views);
+  refined = refineByOwnLooks(refined.camera_from_object, {3, 2.5}, exact ? &*exact : nullptr);
 }
 
 /// A body that looks nearly the same turned over or round may have been taken for it: the best of
 /// the pose and its turned ones.
 FoundPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Pose>& rivals) const {
-  const auto same = [&](const Pose& a, const Pose& b) {
-    return (a.translation() - b.translation()).norm() < kSame * model_->radius() &&
-           angleBetween(a.linear(), b.linear(), symmetry_) < kSame;
-  };
   std::vector<Hypothesis> hypotheses;
   for (const Pose& other : turned(pose.camera_from_object))
     hypotheses.push_back({toParticlePose(other), 0, 0});
@@ -773,7 +778,7 @@ FoundPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Pose
   starts.push_back(pose.camera_from_object);
   for (const Pose& rival : rivals) {
     if (std::none_of(starts.begin(), starts.end(),
-                     [&](const Pose& known) { return same(rival, known); }))
+                     [&](const Pose& known) { return areWithin(kSame, rival, known); }))
       starts.push_back(rival);
   }
   const auto differ = [&](const Pose& a, const Pose& b) {
@@ -781,13 +786,9 @@ FoundPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Pose
            angleBetween(a.linear(), b.linear(), symmetry_) > kApartTurn;
   };
   std::vector<RefinedPose> refined(starts.size());
-  std::vector<Appearance> looks(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
-    refined[i] = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 7, 4});
-    // What is object and what is not, each says for itself.
-    refiner_.learn(*model_, fields_, refined[i].camera_from_object, looks[i]);
-    refined[i] =
-        refiner_.refine(*model_, fields_, refined[i].camera_from_object, {}, looks[i], {3, 2.5});
+    const RefinedPose moved = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 7, 4});
+    refined[i] = refineByOwnLooks(moved.camera_from_object, {3, 2.5});
   });
   std::vector<std::size_t> ranked(starts.size()), order;
   std::iota(ranked.begin(), ranked.end(), std::size_t{0});
@@ -798,7 +799,7 @@ FoundPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Pose
   for (const std::size_t i : ranked) {
     if (order.size() >= kExactlySeen) break;
     if (std::none_of(order.begin(), order.end(), [&](std::size_t known) {
-          return same(refined[i].camera_from_object, refined[known].camera_from_object);
+          return areWithin(kSame, refined[i].camera_from_object, refined[known].camera_from_object);
         }))
       order.push_back(i);
   }
@@ -835,10 +836,7 @@ void PoseSearch::learn(const Pose& camera_from_object, Appearance& appearance) c
 }
 
 RefinedPose PoseSearch::judge(const Pose& camera_from_object) const {
-  Appearance looks;
-  refiner_.learn(*model_, fields_, camera_from_object, looks);
-  RefinedPose refined =
-      refiner_.refine(*model_, fields_, camera_from_object, {}, looks, {4, 3, 2.5});
+  RefinedPose refined = refineByOwnLooks(camera_from_object, {4, 3, 2.5});
   settle(refined);
   refined.log_likelihood += shaded_view_.logLikelihood(fields_, refined.camera_from_object);
   return refined;

@@ -114,6 +114,9 @@ class PoseSearch {
   double reachOf(const Pose& pose) const;
   void compareEyes(RefinedPose& refined) const;
   void toAgreeingDepth(RefinedPose& refined) const;
+  bool areWithin(double apart, const Pose& a, const Pose& b) const;
+  RefinedPose refineByOwnLooks(const Pose& pose, const std::vector<double>& ranges,
+                               const std::array<ContourView, 2>* exact = nullptr) const;
   void settle(RefinedPose& refined) const;
   FoundPose bestTurned(const RefinedPose& pose, const std::vector<Pose>& rivals) const;
   void scoreAll(std::vector<Hypothesis>& hypotheses, int points, const std::array<GainMap, 2>& maps,
