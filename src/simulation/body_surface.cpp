@@ -4,20 +4,28 @@
 #include <cmath>
 #include <map>
 
+#include "rounded_body.hpp"
+
 namespace leap_object_tracker {
-namespace {
-
-constexpr float kSmoothCosine = 0.82F;  // faces closer than 35 deg belong to one round surface
-
-}  // namespace
-
 BodySurface::BodySurface(const Mesh& mesh, double edge_radius)
-    : triangles_(mesh.triangles), edge_radius_(static_cast<float>(edge_radius)) {
-  for (const auto& vertex : mesh.vertices) {
+    : edge_radius_(static_cast<float>(edge_radius)) {
+  const auto rounded = edge_radius > 0 ? roundEdges(mesh, edge_radius) : std::nullopt;
+  const Mesh& shape = rounded ? rounded->mesh : mesh;
+  triangles_ = shape.triangles;
+  for (const auto& vertex : shape.vertices) {
     vertices_.push_back(vertex.cast<float>());
     radius_ = std::max(radius_, vertices_.back().norm());
   }
-  findNormals();
+  if (rounded) {
+    for (const auto& t : triangles_)
+      corner_normals_.push_back({rounded->normals[t[0]].cast<float>(),
+                                 rounded->normals[t[1]].cast<float>(),
+                                 rounded->normals[t[2]].cast<float>()});
+    return;
+  }
+  for (const auto& corners : cornerNormals(mesh))
+    corner_normals_.push_back(
+        {corners[0].cast<float>(), corners[1].cast<float>(), corners[2].cast<float>()});
   if (edge_radius_ > 0) findCreases();
 }
 
@@ -42,28 +50,11 @@ Eigen::Vector3f BodySurface::normal(std::uint32_t triangle, float u, float v) co
   return normal;
 }
 
-void BodySurface::findNormals() {
-  std::vector<std::vector<std::uint32_t>> faces_of(vertices_.size());
-  std::vector<Eigen::Vector3f> weighted;  // length: twice the area
-  for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
-    const auto& t = triangles_[i];
-    weighted.push_back(
-        (vertices_[t[1]] - vertices_[t[0]]).cross(vertices_[t[2]] - vertices_[t[0]]));
-    face_normals_.push_back(weighted.back().normalized());
-    for (const auto vertex : t) faces_of[vertex].push_back(i);
-  }
-  for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
-    corner_normals_.emplace_back();
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-      for (const auto face : faces_of[triangles_[i][corner]])
-        if (face_normals_[face].dot(face_normals_[i]) > kSmoothCosine) sum += weighted[face];
-      corner_normals_.back()[corner] = sum.normalized();
-    }
-  }
-}
-
 void BodySurface::findCreases() {
+  std::vector<Eigen::Vector3f> face_normals;
+  for (const auto& t : triangles_)
+    face_normals.push_back(
+        (vertices_[t[1]] - vertices_[t[0]]).cross(vertices_[t[2]] - vertices_[t[0]]).normalized());
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> faces_of_edge;
   for (std::uint32_t i = 0; i < triangles_.size(); ++i)
     for (std::size_t k = 0; k < 3; ++k) {
@@ -77,16 +68,15 @@ void BodySurface::findCreases() {
   for (const auto& edge : faces_of_edge) {
     if (edge.second.size() != 2) continue;
     const auto a = edge.second[0], b = edge.second[1];
-    if (face_normals_[a].dot(face_normals_[b]) > kSmoothCosine) {
+    if (smoothlyJoined(face_normals[a].cast<double>(), face_normals[b].cast<double>())) {
       continued[a].push_back(b);
       continued[b].push_back(a);
       continue;
     }
     const Eigen::Vector3f start = vertices_[edge.first.first];
     const Eigen::Vector3f span = vertices_[edge.first.second] - start;
-    const Crease crease{
-        start, span.normalized(), span.norm(),
-        (face_normals_[a] + face_normals_[b] + 1e-4F * face_normals_[a]).normalized()};
+    const Crease crease{start, span.normalized(), span.norm(),
+                        (face_normals[a] + face_normals[b] + 1e-4F * face_normals[a]).normalized()};
     own[a].push_back(crease);
     own[b].push_back(crease);
   }

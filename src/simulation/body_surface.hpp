@@ -9,7 +9,8 @@
 
 namespace leap_object_tracker {
 
-/// What shading needs to know of a mesh: smooth normals on round parts, rounded creases on edges.
+/// What the renderer needs to know of a mesh: its triangles with rounded edges, smooth normals on
+/// round parts. Of bodies that roundEdges() does not know the edges are rounded in shading only.
 class BodySurface {
  public:
   /// @param edge_radius [m] of the rounding
@@ -32,12 +33,10 @@ class BodySurface {
     Eigen::Vector3f normal;
   };
 
-  void findNormals();
   void findCreases();
 
   std::vector<Eigen::Vector3f> vertices_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
-  std::vector<Eigen::Vector3f> face_normals_;
   std::vector<std::array<Eigen::Vector3f, 3>> corner_normals_;
   std::vector<std::vector<Crease>> creases_;  ///< one list a triangle
   float edge_radius_;

@@ -98,14 +98,15 @@ class PolyhedronTable : public ContourModel::Table {
       const bool first = (visible >> edge.faces[0] & 1) != 0;
       const bool second = (visible >> edge.faces[1] & 1) != 0;
       if (!first && !second) continue;
-      Eigen::Vector3d outward = Eigen::Vector3d::Zero();
+      Eigen::Vector3d outward = Eigen::Vector3d::Zero(), hidden = Eigen::Vector3d::Zero();
       if (first != second) {
         // In the plane of the visible face, away from it: the side on which the hidden face looks.
         const Eigen::Vector3d seen = faces_[edge.faces[first ? 0 : 1]].head<3>().cast<double>();
-        const Eigen::Vector3d hidden = faces_[edge.faces[first ? 1 : 0]].head<3>().cast<double>();
+        hidden = faces_[edge.faces[first ? 1 : 0]].head<3>().cast<double>();
         outward = (hidden - seen * seen.dot(hidden)).normalized();
       }
       ContourSegment segment{edge.start, edge.end, outward};
+      segment.hidden = hidden;
       for (std::size_t side = 0; side < 2; ++side)
         if (side == 0 ? first : second)
           segment.faces[side] = faces_[edge.faces[side]].head<3>().cast<double>();
@@ -228,7 +229,10 @@ class CylinderTable : public ContourModel::Table {
       if (!rim.visible) continue;
       all.push_back({at(angle - piece / 2), at(angle + piece / 2), rim.outward});
       all.back().faces = rim.faces;
-      if (!rim.outward.isZero()) continue;
+      if (!rim.outward.isZero()) {  // it looks off the face that is seen: as the other one does
+        all.back().hidden = rim.outward;
+        continue;
+      }
       all.back().orderFaces(Eigen::Vector3d(0, 0, -end));
     }
   }

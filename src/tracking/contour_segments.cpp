@@ -29,6 +29,7 @@ std::vector<ContourPoint> spread(const std::vector<ContourSegment>& segments, in
       point.inner = segment.inner ? 1.0F : 0.0F;
       for (std::size_t side = 0; side < 2; ++side)
         point.faces[side] = segment.faces[side].cast<float>();
+      point.hidden = segment.hidden.cast<float>();
       points.push_back(point);
     }
     passed += length;

@@ -17,6 +17,7 @@ struct ContourSegment {
   bool inner = false;       ///< as in ContourPoint
   /// As in ContourPoint.
   std::array<Eigen::Vector3d, 2> faces{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  Eigen::Vector3d hidden = Eigen::Vector3d::Zero();  ///< as in ContourPoint
 
   /// Puts the faces in their order.
   /// @param into from the segment into the first face

@@ -12,6 +12,7 @@ constexpr double kWorthWhile = 6;       // landmarks that carry a pose
 constexpr int kWellKnownSide = 20;      // landmarks of which some would be recognised
 constexpr double kNotSeen = 3;          // fewer are as good as none
 constexpr std::size_t kTextured = 12;   // features of something that has texture
+constexpr double kFewOfKnown = 0.2;     // features where that share of landmarks should be
 constexpr double kClearContour = 0.75;  // share of it, above which features have little to add
 constexpr double kHiddenContour = 0.6;  // share of it
 constexpr int kTrial = 5;               // frames
@@ -47,8 +48,7 @@ FeatureTracking::FeatureTracking(const TrackerParams& params, const ObjectModel&
 
 void FeatureTracking::restart(bool sure) {
   observed_ = carried_ = false;
-  votes_.clear();
-  voters_ = 0;
+  forgetVotes();
   unsure_ = !sure && !measurement_.landmarks().landmarks().empty();
   doubts_ = 0;
   wait_ = 0;
@@ -128,17 +128,25 @@ bool FeatureTracking::contradict(const Pose& camera_from_object, double contour_
 }
 
 bool FeatureTracking::refuse(const Pose& found) const {
+  const auto features = static_cast<double>(measurement_.features().size());
   const std::vector<Pose> poses = equivalents(found);
-  return measurement_.features().size() >= kTextured &&
-         std::any_of(poses.begin(), poses.end(), [&](const Pose& pose) { return wouldKnow(pose); });
+  return std::any_of(poses.begin(), poses.end(), [&](const Pose& pose) {
+    const double expected = measurement_.landmarks().expected(pose);
+    return expected >= kWellKnownSide &&
+           (features >= static_cast<double>(kTextured) || features < kFewOfKnown * expected);
+  });
 }
 
 void FeatureTracking::countRefusal() {
   if (++refusals_ < kRefusals) return;
   refusals_ = 0;
+  forgetVotes();
+  measurement_.landmarks().clear();
+}
+
+void FeatureTracking::forgetVotes() {
   votes_.clear();
   voters_ = 0;
-  measurement_.landmarks().clear();
 }
 
 std::optional<Pose> FeatureTracking::recall(const RectifiedStereoFrame& frame,
@@ -255,6 +263,7 @@ std::optional<Pose> FeatureTracking::absolute(const RectifiedStereoFrame& frame,
         angleBetween(refined[i].linear(), refined[best].linear()) > kSameRotation)
       return std::nullopt;
   unsure_ = false;
+  forgetVotes();  // of this search, not of the next one
   return nearestEquivalent(found, refined[best], symmetry_);
 }
 

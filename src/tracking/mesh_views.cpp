@@ -499,8 +499,8 @@ class ViewFile {
   }
 
  private:
-  static constexpr std::uint64_t kVersion = 7;  ///< of the format and of how views are found
-  static_assert(sizeof(ContourPoint) == 18 * sizeof(float), "written as bytes, without gaps");
+  static constexpr std::uint64_t kVersion = 8;  ///< of the format and of how views are found
+  static_assert(sizeof(ContourPoint) == 21 * sizeof(float), "written as bytes, without gaps");
 
   template <class T>
   static void put(const T* values, std::size_t count, std::vector<char>& bytes) {

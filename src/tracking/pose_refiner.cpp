@@ -49,8 +49,9 @@ constexpr double kFine = 2.6;            // [px] ranges below this are searched 
 constexpr int kProfile = 7;              // [px] half length of a profile that steps are fitted to
 constexpr double kLargestShift = 2;      // [px] of a fitted step
 constexpr int kShortProfile = 3;         // [px] the same, beside texture
-constexpr double kTexturedNoise = 3;     // [grey levels] that a fit leaves there
-constexpr double kShortShare = 0.5;      // of which a short one must leave no more
+constexpr double kNearestStep = 2, kFarthestStep = 5;  // [px] of texture, from the edge
+constexpr double kTexturedNoise = 3;                   // [grey levels] that a fit leaves there
+constexpr double kShortShare = 0.5;                    // of which a short one must leave no more
 // [px^2] that smoothing, slopes by differences and bilinear interpolation add to its square.
 constexpr double kSearchBlur = 1.9;
 constexpr float kIgnoredCosine = 0.6F;
@@ -117,6 +118,17 @@ static float expectedStep(const ContourPoint& point, const Eigen::Vector3f& to_l
   if (point.limb > 0) return -kLimb;
   if (point.outline()) return -std::max(kLeastOutline, brightness(0) + brightness(1));
   return brightness(0) - brightness(1);
+}
+
+/// What the lamps send to a place, towards them.
+/// @param middle the lamp in the middle, in the frame of `at`
+static Eigen::Vector3d lampsFrom(const Eigen::Vector3d& at, const Eigen::Vector3d& middle) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const double beside : {-kLampSpacing, 0.0, kLampSpacing}) {
+    const Eigen::Vector3d to_lamp = middle + beside * Eigen::Vector3d::UnitX() - at;
+    sum += to_lamp / (to_lamp.squaredNorm() * to_lamp.norm());
+  }
+  return sum;
 }
 
 /// One contour point that was looked for in one eye.
@@ -265,13 +277,20 @@ void PoseRefiner::match(const ContourModel& model, const std::array<EdgeField, 2
         match.place -= static_cast<float>(shift) * normal.cast<float>();
       }
       match.normal = normal.cast<float>();
-      if (params_.edge_radius > 0 && !point.outline() && !point.faces[0].isZero() &&
-          !point.faces[1].isZero()) {
+      const auto radius = static_cast<float>(params_.edge_radius);
+      const bool hides = fine && !point.hidden.isZero();
+      const bool crease = !point.outline() && !point.faces[0].isZero() && !point.faces[1].isZero();
+      if (radius > 0 && (hides || crease)) {
+        const Eigen::Vector3f lamps = (rotation.transpose() * lampsFrom(at, light)).cast<float>();
         const Eigen::Vector3f shift =
-            roundedCreaseShift(point.faces[0], point.faces[1], point.tangent, to_light,
-                               static_cast<float>(params_.edge_radius));
-        match.rounding = static_cast<float>(row.dot(rotation * shift.cast<double>()));
-        match.place += match.rounding * match.normal;
+            crease
+                ? roundedCreaseShift(point.faces[0], point.faces[1], point.tangent, lamps, radius)
+                : roundedOutlineShown(point.faces[point.faces[0].isZero() ? 1 : 0], point.hidden,
+                                      point.tangent, (rotation.transpose() * -at).cast<float>(),
+                                      lamps, radius);
+        const auto moved = static_cast<float>(row.dot(rotation * shift.cast<double>()));
+        if (crease) match.rounding = moved;
+        match.place += moved * match.normal;
       }
       matches.push_back(match);
     }
@@ -438,23 +457,29 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
     grey[static_cast<std::size_t>(k - first)] =
         image(fu + static_cast<float>(k) * nu, fv + static_cast<float>(k) * nv);
   const double blur = std::sqrt(std::pow(kBlurU * nu, 2) + std::pow(kBlurV * nv, 2));
-  const auto fitBetween = [&](int from, int to) {
+  const auto before = static_cast<double>(match.before), after = static_cast<double>(match.after);
+  const auto fitBetween = [&](int from, int to, double next_before, double next_after) {
     return fitProfile(grey.data() + (from - first), from, to - from + 1, blur,
-                      {static_cast<double>(match.before), static_cast<double>(match.after)});
+                      {next_before, next_after});
   };
-  auto edge = fitBetween(first, last);
+  auto edge = fitBetween(first, last, before, after);
   if (!edge) return;
   match.noise = edge->noise;
-  // Texture beside the edge: less of it.
-  if (match.outline && edge->noise > kTexturedNoise) {
-    for (const auto& [from, to] : {std::pair(-kShortProfile, last), std::pair(first, kShortProfile),
-                                   std::pair(-kShortProfile, kShortProfile)}) {
-      if (from < first || to > last) continue;
-      const auto shorter = fitBetween(from, to);
-      if (shorter && shorter->noise < kShortShare * match.noise &&
-          shorter->variance < edge->variance)
-        edge = shorter;
+  // Texture beside the edge: a step of its own, or less of it.
+  if (edge->noise > kTexturedNoise) {
+    const auto consider = [&](const std::optional<ProfileEdge>& other) {
+      if (other && other->noise < kShortShare * match.noise && other->variance < edge->variance)
+        edge = other;
+    };
+    for (double step = kNearestStep; step <= kFarthestStep; ++step) {
+      if (before < -step - 1) consider(fitBetween(first, last, -step, after));
+      if (!match.outline && after > step + 1) consider(fitBetween(first, last, before, step));
     }
+    if (match.outline)
+      for (const auto& [from, to] :
+           {std::pair(-kShortProfile, last), std::pair(first, kShortProfile),
+            std::pair(-kShortProfile, kShortProfile)})
+        if (from >= first && to <= last) consider(fitBetween(from, to, before, after));
   }
   if (std::abs(edge->offset) > kLargestShift) return;
   match.offset = edge->offset - static_cast<double>(match.merged);

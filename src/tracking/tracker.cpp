@@ -273,13 +273,13 @@ class Tracker::Impl {
     const auto enough = [&](const FoundPose& candidate) {
       if (!goodStart(candidate.refined)) return false;
       const Pose pose = asLastSeen(candidate.refined.camera_from_object);
-      const PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
-      known = features_.absolute(frame, regions(belief), pose);
-      const bool other = !known && last_seen_ && !unconfirmed &&
+      known = features_.absolute(frame, regionsAbout(pose), pose);
+      const bool same = sameAsLast(candidate.refined);
+      const bool other = !known && !same && last_seen_ && !unconfirmed &&
                          !fastSinceFound(pose, frame.stamp) && features_.refuse(pose);
       refused = refused || other;
       // The object is there, but nobody knows which way: until it shows, there is no pose.
-      accepted = !other && (known || isClear(candidate) || sameAsLast(candidate.refined));
+      accepted = !other && (known || isClear(candidate) || same);
       report_.unclear = !other && !accepted;
       if (report_.unclear) unclear_ = {candidate.refined.camera_from_object, *candidate.rival};
       return !other;
@@ -366,6 +366,7 @@ class Tracker::Impl {
     frames_to_opinion_ = opinion_period_ = std::min(2 * opinion_period_, kLastOpinion);
     const auto started = Clock::now();
     std::optional<RefinedPose> own;
+    std::optional<Pose> known;
     bool better = false;
     PoseSearch::Query query;
     query.near = belief_.pose;
@@ -373,15 +374,20 @@ class Tracker::Impl {
         search_.find(frame, query, [&](const FoundPose& candidate) {
           if (!own) own = search_.judge(belief_.pose);
           const RefinedPose& other = candidate.refined;
-          better = goodStart(other) && isClear(candidate) &&
-                   other.support() > own->support() + kOpinionSupport &&
-                   other.log_likelihood > own->log_likelihood + kOpinionMargin &&
-                   !features_.refuse(other.camera_from_object);
+          if (!goodStart(other) || !isClear(candidate) ||
+              other.support() < own->support() + kOpinionSupport ||
+              other.log_likelihood < own->log_likelihood + kOpinionMargin)
+            return false;
+          const Pose pose = asLastSeen(other.camera_from_object);
+          known = features_.absolute(frame, regionsAbout(pose), pose);
+          better = known || !features_.refuse(pose);
           return better;
         });
+    features_.forgetVotes();
     report_.search_ms = millisecondsSince(started);
     if (!better) return;
-    takeUp(asLastSeen(found->refined.camera_from_object), frame.stamp, false);
+    takeUp(known.value_or(asLastSeen(found->refined.camera_from_object)), frame.stamp,
+           known.has_value());
     report_.state = TrackerState::kLost;
   }
 
@@ -410,14 +416,16 @@ class Tracker::Impl {
   /// Whether motion may blur landmarks beyond recognition.
   bool fastSinceFound(const Pose& pose, Stamp stamp) const {
     const auto velocity = velocitySinceFound(pose, stamp);
-    return velocity && velocity->head<3>().norm() > kBlurring;
+    return velocity && !last_found_->where_it_was && velocity->head<3>().norm() > kBlurring;
   }
 
   /// A pose that must prove itself in the next frame.
   void takeUp(const Pose& pose, Stamp stamp, bool sure) {
     PoseBelief belief = beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma);
     if (const auto velocity = velocitySinceFound(pose, stamp)) belief.velocity = *velocity;
-    last_found_ = Found{stamp, pose};
+    const bool where_it_was =
+        last_seen_ && (pose.translation() - last_seen_->translation()).norm() < kSameReach;
+    last_found_ = Found{stamp, pose, where_it_was};
     begin(belief, sure);
     last_stamp_ = stamp;
     confirming_ = true;
@@ -504,6 +512,11 @@ class Tracker::Impl {
       regions[eye] = cv::Rect(first, last) & whole;
     }
     return regions;
+  }
+
+  /// Likewise, of a pose that was just found.
+  std::array<cv::Rect, 2> regionsAbout(const Pose& pose) const {
+    return regions(beliefAt(pose, kFoundPositionSigma, kFoundRotationSigma));
   }
 
   Matrix6d covarianceToReport() const {
@@ -924,6 +937,7 @@ class Tracker::Impl {
   struct Found {
     Stamp stamp;
     Pose camera_from_object;
+    bool where_it_was;  ///< when it was lost, so that it does not fly
   };
   std::optional<Found> last_found_;  ///< by a search or by landmarks
 };

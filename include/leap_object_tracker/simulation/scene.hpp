@@ -22,7 +22,7 @@ struct SceneBody {
   Paint paint;
   MotionScript motion;
   Parent parent = Parent::kScene;
-  double edge_radius = 2e-4;  ///< [m] of rounded edges, in shading only
+  double edge_radius = 2e-4;  ///< [m] of rounded edges; unless the body is convex, in shading only
 };
 
 /// When frames are taken.

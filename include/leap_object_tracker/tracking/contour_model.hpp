@@ -25,6 +25,8 @@ struct ContourPoint {
   /// Unit normals of the faces that the eye sees, the first on the side of tangent x normal; zero
   /// where there is none or where the surface is curved.
   std::array<Eigen::Vector3f, 2> faces{Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero()};
+  /// Unit normal of the face that an outline at a rounded edge hides; else zero.
+  Eigen::Vector3f hidden = Eigen::Vector3f::Zero();
 
   bool outline() const { return outward.squaredNorm() > 0.5F; }
 };

@@ -63,13 +63,16 @@ class FeatureTracking {
   std::optional<Pose> absolute(const RectifiedStereoFrame& frame,
                                const std::array<cv::Rect, 2>& regions, const Pose& found);
 
+  /// What frames before told absolute() counts no more.
+  void forgetVotes();
+
   /// The pose that landmarks tell near another, also where its contour is hidden; nothing if they
   /// do not know.
   std::optional<Pose> recall(const RectifiedStereoFrame& frame,
                              const std::array<cv::Rect, 2>& regions, const Pose& near);
 
   /// Whether a pose that was found, and that absolute() could not confirm, is of another thing of
-  /// the same shape.
+  /// the same shape: of other texture, or of none where landmarks should be.
   bool refuse(const Pose& found) const;
   /// A frame in which all that was found was refused: after many in a row the landmarks are
   /// forgotten.
