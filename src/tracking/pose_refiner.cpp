@@ -48,6 +48,7 @@ constexpr double kTextureRange = 4.5;    // [px] ranges below this look at the t
 constexpr double kFine = 2.6;            // [px] ranges below this are searched by fitted steps
 constexpr int kProfile = 7;              // [px] half length of a profile that steps are fitted to
 constexpr double kLargestShift = 2;      // [px] of a fitted step
+constexpr double kFittedShare = 0.625;   // of edge_sigma, that a fitted step errs by
 constexpr int kShortProfile = 3;         // [px] the same, beside texture
 constexpr double kNearestStep = 2, kFarthestStep = 5;  // [px] of texture, from the edge
 constexpr double kTexturedNoise = 3;                   // [grey levels] that a fit leaves there
@@ -483,7 +484,7 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
   }
   if (std::abs(edge->offset) > kLargestShift) return;
   match.offset = edge->offset - static_cast<double>(match.merged);
-  match.variance = params_.edge_sigma * params_.edge_sigma + edge->variance +
+  match.variance = std::pow(kFittedShare * params_.edge_sigma, 2) + edge->variance +
                    std::pow(kRoundingDoubt * static_cast<double>(match.rounding), 2);
 }
 
@@ -518,7 +519,8 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
         if ((m.outline ? alike : std::abs(alike)) > kIgnoredCosine) m.found = false;
       }
     const double deviation = robustScale(range);
-    const double limit = std::min(range + 1, 4.685 * std::max(deviation, params_.edge_sigma));
+    const double limit =
+        std::min(range + 1, 4.685 * std::max(deviation, kFittedShare * params_.edge_sigma));
     // Edges that lie farther off than their noise says share a wrong pose, not wrong edges.
     const double inflation = std::max(1.0, deviation / params_.edge_sigma);
     Matrix6d information = prior.information;
@@ -572,7 +574,8 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     }
     double gain = -missed;
     if (m.found) {
-      const double weight = tukeyWeight(m.offset, 4.685 * std::max(deviation, params_.edge_sigma));
+      const double weight =
+          tukeyWeight(m.offset, 4.685 * std::max(deviation, kFittedShare * params_.edge_sigma));
       result.information.noalias() += kIndependentErrors * weight * m.samples / m.variance *
                                       m.jacobian * m.jacobian.transpose();
       found += weight * m.samples;
