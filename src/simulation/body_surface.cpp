@@ -7,6 +7,7 @@
 #include "rounded_body.hpp"
 
 namespace leap_object_tracker {
+
 BodySurface::BodySurface(const Mesh& mesh, double edge_radius)
     : edge_radius_(static_cast<float>(edge_radius)) {
   const auto rounded = edge_radius > 0 ? roundEdges(mesh, edge_radius) : std::nullopt;

@@ -26,6 +26,25 @@ Vector3f shiftOf(double first, double radius) {
                             Vector3f::UnitZ(), static_cast<float>(radius));
 }
 
+/// Where fitProfile() sees the edge of a blurred image, from `from` on.
+/// @param brightness of a place
+template <class Brightness>
+double fittedAt(const Brightness& brightness, double from, double blur) {
+  std::array<float, 15> grey{};
+  for (std::size_t i = 0; i < grey.size(); ++i) {
+    double sum = 0, weights = 0;
+    for (double u = -5; u < 5; u += 0.01) {
+      const double weight = std::exp(-0.5 * u * u / (blur * blur));
+      sum += weight * brightness(from + static_cast<double>(i) - 7 + u);
+      weights += weight;
+    }
+    grey[i] = static_cast<float>(200 * sum / weights);
+  }
+  const auto edge = fitProfile(grey.data(), -7, static_cast<int>(grey.size()), blur, {});
+  EXPECT_TRUE(edge);
+  return edge ? edge->offset : 1e3;
+}
+
 /// Where fitProfile() sees the edge between faces that a circle joins, from where its outline is.
 double seenAt(double first, double radius, double blur) {
   const double last = first + kAngle;
@@ -37,19 +56,7 @@ double seenAt(double first, double radius, double blur) {
     if (x > radius * std::sin(last)) return std::cos(last);
     return std::sqrt(1 - x * x / (radius * radius));
   };
-  std::array<float, 15> grey{};
-  for (std::size_t i = 0; i < grey.size(); ++i) {
-    double sum = 0, weights = 0;
-    for (double u = -5; u < 5; u += 0.01) {
-      const double weight = std::exp(-0.5 * u * u / (blur * blur));
-      sum += weight * brightness(outline.x() + static_cast<double>(i) - 7 + u);
-      weights += weight;
-    }
-    grey[i] = static_cast<float>(200 * sum / weights);
-  }
-  const auto edge = fitProfile(grey.data(), -7, static_cast<int>(grey.size()), blur, {});
-  EXPECT_TRUE(edge);
-  return edge ? edge->offset : 1e3;
+  return fittedAt(brightness, outline.x(), blur);
 }
 
 TEST(RoundedEdge, showsItsCreaseWhereABlurredProfileHasIt) {
@@ -87,19 +94,7 @@ double outlineSeenAt(double tilt, double between, double light, double radius, d
     if (x > radius) return 0.0;
     return std::cos(std::max(tilt, std::asin(std::max(-1.0, x / radius))) - light);
   };
-  std::array<float, 15> grey{};
-  for (std::size_t i = 0; i < grey.size(); ++i) {
-    double sum = 0, weights = 0;
-    for (double u = -5; u < 5; u += 0.01) {
-      const double weight = std::exp(-0.5 * u * u / (blur * blur));
-      sum += weight * brightness(from + static_cast<double>(i) - 7 + u);
-      weights += weight;
-    }
-    grey[i] = static_cast<float>(200 * sum / weights);
-  }
-  const auto edge = fitProfile(grey.data(), -7, static_cast<int>(grey.size()), blur, {});
-  EXPECT_TRUE(edge);
-  return edge ? edge->offset : 1e3;
+  return fittedAt(brightness, from, blur);
 }
 
 TEST(RoundedEdge, showsItsOutlineWhereABlurredProfileHasIt) {
