@@ -37,9 +37,9 @@ constexpr double kWorseFit = 1.25;        // times the residual of the frames be
 constexpr int kMoreHypotheses = 16;       // refined then
 constexpr int kSides = 6;                 // left out in turn then
 constexpr std::size_t kCandidates = 300;  // of the particles, to be refined
-constexpr double kCommonPixels = 0.06;    // [px] of calibration
+constexpr double kCommonPixels = 0.04;    // [px] of calibration
 constexpr double kCommonLines = 5;        // of the contour that err each for itself
-constexpr double kCommonShape = 4.5e-5;   // [m] of the object's shape
+constexpr double kCommonShape = 3e-5;     // [m] of the object's shape
 // RefinedPose::scatter of poses that err as their information says. It is not 1, as lines share
 // errors that the fit takes up and no residual shows.
 constexpr double kUsualScatter = 0.4;
