@@ -25,12 +25,11 @@ struct Corner {
   Eigen::Vector3d center;
   std::vector<Eigen::Vector3d> normals;
 
-  /// Which of the surfaces has this normal; adds it.
-  std::size_t surface(const Eigen::Vector3d& normal) {
-    for (std::size_t i = 0; i < normals.size(); ++i)
-      if ((normals[i] - normal).squaredNorm() < kSameNormal) return i;
-    normals.push_back(normal);
-    return normals.size() - 1;
+  void addSurface(const Eigen::Vector3d& normal) {
+    if (std::none_of(normals.begin(), normals.end(), [&](const Eigen::Vector3d& known) {
+          return (known - normal).squaredNorm() < kSameNormal;
+        }))
+      normals.push_back(normal);
   }
 };
 
@@ -53,7 +52,7 @@ class Rounder {
   bool placeCenters() {
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k)
-        corners_[mesh_.triangles[t][k]].surface(corner_normals_[t][k]);
+        corners_[mesh_.triangles[t][k]].addSurface(corner_normals_[t][k]);
     for (std::size_t i = 0; i < corners_.size(); ++i) {
       Corner& corner = corners_[i];
       const auto count = static_cast<Eigen::Index>(corner.normals.size());

@@ -23,6 +23,18 @@ inline float lampLight(float lamp_x, const Eigen::Vector3f& at, const Eigen::Vec
   return cosine / (square * std::sqrt(square));
 }
 
+/// What all lamps send to a place, towards them [1/m^2].
+/// @param middle the lamp in the middle, in the frame of `at`
+inline Eigen::Vector3d lampsFrom(const Eigen::Vector3d& at, const Eigen::Vector3d& middle) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int lamp = 0; lamp < kLamps; ++lamp) {
+    const Eigen::Vector3d to_lamp =
+        middle + (lamp - 1) * kLampSpacing * Eigen::Vector3d::UnitX() - at;
+    sum += to_lamp / (to_lamp.squaredNorm() * to_lamp.norm());
+  }
+  return sum;
+}
+
 /// [px] standard deviations of the point spread of a rectified image, across and down.
 constexpr double kBlurU = 0.78, kBlurV = 1.08;
 

@@ -121,17 +121,6 @@ static float expectedStep(const ContourPoint& point, const Eigen::Vector3f& to_l
   return brightness(0) - brightness(1);
 }
 
-/// What the lamps send to a place, towards them.
-/// @param middle the lamp in the middle, in the frame of `at`
-static Eigen::Vector3d lampsFrom(const Eigen::Vector3d& at, const Eigen::Vector3d& middle) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const double beside : {-kLampSpacing, 0.0, kLampSpacing}) {
-    const Eigen::Vector3d to_lamp = middle + beside * Eigen::Vector3d::UnitX() - at;
-    sum += to_lamp / (to_lamp.squaredNorm() * to_lamp.norm());
-  }
-  return sum;
-}
-
 /// One contour point that was looked for in one eye.
 struct PoseRefiner::Match {
   Twist jacobian;                 ///< of the offset along the normal, by the camera twist [px]

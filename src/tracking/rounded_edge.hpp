@@ -32,7 +32,7 @@ Eigen::Vector3f roundedOutlineShown(const Eigen::Vector3f& seen, const Eigen::Ve
 /// lies where a sharp step would leave as much light, from the circle's centre at
 ///   x = radius * (b - a - sin b cos b + sin a cos a) / (2 (cos a - cos b)).
 /// At most some radii: of faces that are equally bright, only a line is left.
-/// @param tangent unit vector along the edge @param to_light unit vector, in the same frame
+/// @param tangent unit vector along the edge @param to_light of any length, in the same frame
 Eigen::Vector3f roundedCreaseShift(const Eigen::Vector3f& normal_a, const Eigen::Vector3f& normal_b,
                                    const Eigen::Vector3f& tangent, const Eigen::Vector3f& to_light,
                                    float radius);
