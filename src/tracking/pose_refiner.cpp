@@ -56,6 +56,8 @@ constexpr double kShortShare = 0.5;                    // of which a short one m
 // [px^2] that smoothing, slopes by differences and bilinear interpolation add to its square.
 constexpr double kSearchBlur = 1.9;
 constexpr float kIgnoredCosine = 0.6F;
+// [px] a pose whose last search was longer is not exact yet, and not worth fitted steps.
+constexpr double kSettledRange = 3.5;
 // Share of the contour that an eye finds: so little in one eye and so much in the other mean that
 // something hides the object from the first.
 constexpr double kHiddenShare = 0.4, kSeenShare = 0.7;
@@ -430,6 +432,18 @@ std::optional<int> PoseRefiner::ignoreHiddenEye(std::vector<Match>& matches) {
   return std::nullopt;
 }
 
+/// [px] standard deviation of the edges' offsets, by their median; `otherwise` if few were found.
+double PoseRefiner::robustScale(const std::vector<Match>& matches, double otherwise) {
+  thread_local std::vector<double> sizes;
+  sizes.clear();
+  for (const Match& m : matches)
+    if (m.found) sizes.push_back(std::abs(m.offset));
+  if (sizes.size() < 6) return otherwise;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return std::max(0.25, 1.4826 * *middle);
+}
+
 /// Replaces the place of the steepest slope by that of a fitted step.
 template <class Image>
 void PoseRefiner::fit(const Image& image, Match& match) const {
@@ -477,37 +491,23 @@ void PoseRefiner::fit(const Image& image, Match& match) const {
                    std::pow(kRoundingDoubt * static_cast<double>(match.rounding), 2);
 }
 
-RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
-                                const Pose& start, const PosePrior& prior,
-                                const Appearance& appearance, const std::vector<double>& ranges,
-                                const std::array<ContourView, 2>* exact,
-                                const Eigen::Vector2f& ignored) const {
-  RefinedPose result;
-  result.camera_from_object = start;
+Pose PoseRefiner::move(const ContourModel& model, const std::array<EdgeField, 2>& fields,
+                       const Pose& start, const PosePrior& prior, const Appearance& appearance,
+                       const std::vector<double>& ranges, const std::array<ContourView, 2>* exact,
+                       const Eigen::Vector2f& ignored) const {
+  Pose pose = start;
   thread_local std::vector<Match> matches;
-  Pose& pose = result.camera_from_object;
-
-  const auto robustScale = [&](double range) {
-    thread_local std::vector<double> sizes;
-    sizes.clear();
-    for (const Match& m : matches)
-      if (m.found) sizes.push_back(std::abs(m.offset));
-    if (sizes.size() < 6) return range;
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    return std::max(0.25, 1.4826 * *middle);
-  };
-
+  std::array<EyeSupport, 2> eyes;
   for (const double range : ranges) {
     match(model, fields, pose, exact, range, appearance, range < kFine, kCrowdedRange, matches,
-          result.eyes);
+          eyes);
     ignoreHiddenEye(matches);
     if (!ignored.isZero())
       for (Match& m : matches) {
         const float alike = m.normal.dot(ignored);
         if ((m.outline ? alike : std::abs(alike)) > kIgnoredCosine) m.found = false;
       }
-    const double deviation = robustScale(range);
+    const double deviation = robustScale(matches, range);
     const double limit =
         std::min(range + 1, 4.685 * std::max(deviation, kFittedShare * params_.edge_sigma));
     // Edges that lie farther off than their noise says share a wrong pose, not wrong edges.
@@ -537,12 +537,31 @@ RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<Edge
     if (turn > 0.35) limited *= 0.35 / turn;
     pose = normalized(movedInCamera(pose, limited));
   }
+  return pose;
+}
 
+RefinedPose PoseRefiner::refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
+                                const Pose& start, const PosePrior& prior,
+                                const Appearance& appearance, const std::vector<double>& ranges,
+                                const std::array<ContourView, 2>* exact) const {
+  const Pose pose = move(model, fields, start, prior, appearance, ranges, exact);
+  return judge(model, fields, pose, appearance, ranges.empty() || ranges.back() < kSettledRange,
+               exact);
+}
+
+/// What the image says about a pose.
+/// @param fitted_steps whether edges are placed by fitted steps or by the steepest slope
+RefinedPose PoseRefiner::judge(const ContourModel& model, const std::array<EdgeField, 2>& fields,
+                               const Pose& pose, const Appearance& appearance, bool fitted_steps,
+                               const std::array<ContourView, 2>* exact) const {
+  RefinedPose result;
+  result.camera_from_object = pose;
+  thread_local std::vector<Match> matches;
   const double last_range = 2.5;
-  match(model, fields, pose, exact, last_range, appearance, true, kCrowdedReach, matches,
+  match(model, fields, pose, exact, last_range, appearance, fitted_steps, kCrowdedReach, matches,
         result.eyes);
   const std::optional<int> hidden = result.hidden_eye = ignoreHiddenEye(matches);
-  const double deviation = robustScale(last_range);
+  const double deviation = robustScale(matches, last_range);
   result.residual = deviation;
   double bright = 0, judged = 0, found = 0, squares = 0;
   const std::array<double, 2> typical = brightnessInside(matches);

@@ -787,8 +787,8 @@ FoundPose PoseSearch::bestTurned(const RefinedPose& pose, const std::vector<Pose
   };
   std::vector<RefinedPose> refined(starts.size());
   tbb::parallel_for(std::size_t{0}, starts.size(), [&](std::size_t i) {
-    const RefinedPose moved = refiner_.refine(*model_, fields_, starts[i], {}, {}, {10, 7, 4});
-    refined[i] = refineByOwnLooks(moved.camera_from_object, {3, 2.5});
+    const Pose moved = refiner_.move(*model_, fields_, starts[i], {}, {}, {10, 7, 4});
+    refined[i] = refineByOwnLooks(moved, {3, 2.5});
   });
   std::vector<std::size_t> ranked(starts.size()), order;
   std::iota(ranked.begin(), ranked.end(), std::size_t{0});

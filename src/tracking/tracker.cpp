@@ -740,10 +740,8 @@ class Tracker::Impl {
           const double angle = 2 * M_PI * static_cast<double>(i - sided) / kSides;
           const Eigen::Vector2f side(static_cast<float>(std::cos(angle)),
                                      static_cast<float>(std::sin(angle)));
-          starts[i] = refiner_
-                          .refine(model_, measurement_.fields(), starts[i], doubted, appearance_,
-                                  {8, 5, 3}, nullptr, side)
-                          .camera_from_object;
+          starts[i] = refiner_.move(model_, measurement_.fields(), starts[i], doubted, appearance_,
+                                    {8, 5, 3}, nullptr, side);
         }
         refined[i] =
             refiner_.refine(model_, measurement_.fields(), starts[i], doubted, appearance_,

@@ -95,15 +95,23 @@ class PoseRefiner {
  public:
   PoseRefiner(const ContourParams& params, const RectifiedStereoCamera& camera);
 
+  /// Where a pose goes, without asking what the image says about it there.
   /// @param ranges [px] half length of the search of each iteration
   /// @param exact views of both eyes to use instead of the model's, from a place close by
   /// @param ignored unit vector in the image: contour that looks this way does not move the pose;
   /// zero: all of it does
+  Pose move(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& start,
+            const PosePrior& prior, const Appearance& appearance, const std::vector<double>& ranges,
+            const std::array<ContourView, 2>* exact = nullptr,
+            const Eigen::Vector2f& ignored = Eigen::Vector2f::Zero()) const;
+
+  /// Moves a pose and judges it there.
+  /// @param ranges as above; none: only judges
+  /// @param exact as above
   RefinedPose refine(const ContourModel& model, const std::array<EdgeField, 2>& fields,
                      const Pose& start, const PosePrior& prior, const Appearance& appearance,
                      const std::vector<double>& ranges,
-                     const std::array<ContourView, 2>* exact = nullptr,
-                     const Eigen::Vector2f& ignored = Eigen::Vector2f::Zero()) const;
+                     const std::array<ContourView, 2>* exact = nullptr) const;
 
   /// Takes the looks of the object at a pose that can be trusted into `appearance`.
   /// @param exact as above
@@ -115,6 +123,10 @@ class PoseRefiner {
   static void findClearances(std::size_t first, std::vector<Match>& matches);
   static std::array<double, 2> brightnessInside(const std::vector<Match>& matches);
   static std::optional<int> ignoreHiddenEye(std::vector<Match>& matches);
+  static double robustScale(const std::vector<Match>& matches, double otherwise);
+  RefinedPose judge(const ContourModel& model, const std::array<EdgeField, 2>& fields,
+                    const Pose& pose, const Appearance& appearance, bool fitted_steps,
+                    const std::array<ContourView, 2>* exact) const;
   void match(const ContourModel& model, const std::array<EdgeField, 2>& fields, const Pose& pose,
              const std::array<ContourView, 2>* exact, double range, const Appearance& appearance,
              bool fine, double crowded_range, std::vector<Match>& matches,
