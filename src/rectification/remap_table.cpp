@@ -74,20 +74,24 @@ RemapTable::RemapTable(const cv::Mat& map_u, const cv::Mat& map_v, const cv::Siz
       rows_(static_cast<std::size_t>(size_.height)) {
   const int stride = source_size.width;
   // Four bytes are read at an offset, in its row and in the next one.
-  const int last_offset = source_size.area() - stride - 4;
+  const double lowest = 256.0 * (source_size.height - 2) + 255;
+  const double rightmost = 256.0 * (source_size.width - 2) + 255;
+  const double rightmost_below = 256.0 * (source_size.width - 4) + 255;
   for (int v = 0; v < size_.height; ++v) {
     Row& row = rows_[static_cast<std::size_t>(v)];
     std::vector<int> missing;
     for (int u = 0; u < size_.width; ++u) {
-      const double scaled_u = std::round(256.0 * map_u.at<float>(v, u));
-      const double scaled_v = std::round(256.0 * map_v.at<float>(v, u));
-      const double left = std::floor(scaled_u / 256), above = std::floor(scaled_v / 256);
-      const bool inside = left >= 0 && above >= 0 && left + 1 < source_size.width &&
-                          above + 1 < source_size.height && above * stride + left <= last_offset;
-      if (!inside) {
+      const double from_u = map_u.at<float>(v, u), from_v = map_v.at<float>(v, u);
+      if (!std::isfinite(from_u) || !std::isfinite(from_v)) {
         if (row.end > 0) missing.push_back(u);
         continue;
       }
+      const double scaled_v = std::clamp(std::round(256 * from_v), 0.0, lowest);
+      const double above = std::floor(scaled_v / 256);
+      const double scaled_u =
+          std::clamp(std::round(256 * from_u), 0.0,
+                     above < source_size.height - 2 ? rightmost : rightmost_below);
+      const double left = std::floor(scaled_u / 256);
       if (row.end == 0) row.begin = u;
       row.holes.insert(row.holes.end(), missing.begin(), missing.end());
       missing.clear();

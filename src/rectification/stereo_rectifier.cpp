@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -68,18 +69,17 @@ StereoRectifier::StereoRectifier(const StereoCalibration& calibration,
 
 RemapTable StereoRectifier::makeTable(const CameraCalibration& raw,
                                       const RectifiedStereoCamera& target) {
-  constexpr float kOutside = -1e4F;
+  constexpr float kUnseen = std::numeric_limits<float>::quiet_NaN();
   cv::Mat map_u(target.size, CV_32FC1), map_v(target.size, CV_32FC1);
   for (int v = 0; v < target.size.height; ++v)
     for (int u = 0; u < target.size.width; ++u) {
       const Eigen::Vector3d rectified((u - target.center_u) / target.focal_length,
                                       (v - target.center_v) / target.focal_length, 1);
       const Eigen::Vector3d ray = raw.rectified_from_raw.transpose() * rectified;
-      Eigen::Vector2d pixel(kOutside, kOutside);
-      if (ray.z() > 1e-3) pixel = pixelFromRay(raw, ray.hnormalized());
-      const bool seen = pixel.allFinite() && pixel.cwiseAbs().maxCoeff() < 1e4;
-      map_u.at<float>(v, u) = seen ? static_cast<float>(pixel.x()) : kOutside;
-      map_v.at<float>(v, u) = seen ? static_cast<float>(pixel.y()) : kOutside;
+      Eigen::Vector2f pixel(kUnseen, kUnseen);
+      if (ray.z() > 1e-3) pixel = pixelFromRay(raw, ray.hnormalized()).cast<float>();
+      map_u.at<float>(v, u) = pixel.x();
+      map_v.at<float>(v, u) = pixel.y();
     }
   return RemapTable(map_u, map_v, raw.size);
 }

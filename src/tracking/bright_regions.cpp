@@ -142,4 +142,8 @@ std::vector<BrightRegion> findBrightRegions(const cv::Mat& image) {
   return regions;
 }
 
+std::vector<BrightRegion> findDarkRegions(const cv::Mat& image) {
+  return findBrightRegions(image.empty() ? image : cv::Mat(255 - image));
+}
+
 }  // namespace leap_object_tracker

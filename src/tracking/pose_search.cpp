@@ -234,13 +234,15 @@ std::pair<Eigen::Vector3f, Eigen::Matrix3f> PoseSearch::seenFrom(const ParticleP
           Eigen::Map<const RowMajor>(pose.rotation.data())};
 }
 
-std::vector<PoseSearch::Place> PoseSearch::findPlaces(const RectifiedStereoFrame& frame) const {
+std::vector<PoseSearch::Place> PoseSearch::findPlaces(const RectifiedStereoFrame& frame,
+                                                      bool dark) const {
   std::vector<Place> places;
   const double focal = camera_.focal_length;
   std::array<std::vector<BrightRegion>, 2> regions;
   tbb::parallel_for(std::size_t{0}, std::size_t{2}, [&](std::size_t eye) {
-    if (params_.eyes != (eye == 0 ? Eyes::kRight : Eyes::kLeft))
-      regions[eye] = findBrightRegions(eye == 0 ? frame.left : frame.right);
+    if (params_.eyes == (eye == 0 ? Eyes::kRight : Eyes::kLeft)) return;
+    const cv::Mat& image = eye == 0 ? frame.left : frame.right;
+    regions[eye] = dark ? findDarkRegions(image) : findBrightRegions(image);
   });
   // A shadow looks larger beside the optical axis by the inverse of this.
   const auto narrowing = [&](const BrightRegion& region) {
@@ -581,7 +583,7 @@ std::optional<FoundPose> PoseSearch::find(const RectifiedStereoFrame& frame, con
   if (query.where == Where::kSurfaces && params_.eyes == Eyes::kBoth)
     kept = startsAtSurfaces(frame);
   if (kept.empty()) {
-    places = findPlaces(frame);
+    places = findPlaces(frame, query.where == Where::kDarkRegions);
     kept = startsAtRegions(places);
   }
   if (query.near) {

@@ -107,23 +107,35 @@ ShadedView::Sums ShadedView::compare(const EdgeField& field,
             {static_cast<float>(grey.at<std::uint8_t>(v, u)), shading.at<float>(v, u)});
   if (static_cast<double>(pixels.size()) < kFewestPixels) return {};
 
-  double scale = 0;
+  double lamp_gain = 0, even = 0;  // grey value = lamp_gain * shading + even
   for (int fit = 0; fit < kFits; ++fit) {
-    double upper = 0, lower = 0;
+    double count = 0, shades = 0, squares = 0, values = 0, products = 0;
     for (const auto& [value, shade] : pixels) {
-      const auto expected = static_cast<float>(scale) * shade;
+      const auto expected = static_cast<float>(lamp_gain * static_cast<double>(shade) + even);
       if (value > kSaturated && (fit == 0 || expected > kSaturated)) continue;
       if (fit > 0 && std::abs(value - expected) > kGrossResidual) continue;
-      upper += static_cast<double>(value * shade);
-      lower += static_cast<double>(shade * shade);
+      count += 1;
+      shades += static_cast<double>(shade);
+      squares += static_cast<double>(shade * shade);
+      values += static_cast<double>(value);
+      products += static_cast<double>(value * shade);
     }
-    if (lower <= 0) break;
-    scale = upper / lower;
+    if (squares <= 0) break;
+    const double determinant = count * squares - shades * shades;
+    lamp_gain = even = 0;
+    if (determinant > 1e-6 * count * squares) {
+      lamp_gain = (count * products - shades * values) / determinant;
+      even = (squares * values - shades * products) / determinant;
+    }
+    // No light is negative.
+    if (lamp_gain <= 0 && even > 0) lamp_gain = 0, even = values / count;
+    if (even <= 0) even = 0, lamp_gain = products / squares;
   }
-  if (scale <= 0) return {};
+  if (lamp_gain <= 0 && even <= 0) return {};
   Sums sums;
   for (const auto& [value, shade] : pixels) {
-    const float expected = std::min(255.0F, static_cast<float>(scale) * shade);
+    const float expected =
+        std::min(255.0F, static_cast<float>(lamp_gain * static_cast<double>(shade) + even));
     const float residual = value > kSaturated && expected > kSaturated
                                ? 0
                                : std::clamp(value - expected, -kGrossResidual, kGrossResidual);

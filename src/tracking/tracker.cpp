@@ -284,9 +284,13 @@ class Tracker::Impl {
       if (report_.unclear) unclear_ = {candidate.refined.camera_from_object, *candidate.rival};
       return !other;
     };
-    // What is as bright as its surroundings makes no region.
+    // What is as bright as its surroundings makes no region; in a lit room it may be the darker
+    // one.
+    constexpr std::array<PoseSearch::Where, 4> kTurns{
+        PoseSearch::Where::kBrightRegions, PoseSearch::Where::kSurfaces,
+        PoseSearch::Where::kDarkRegions, PoseSearch::Where::kSurfaces};
     PoseSearch::Query query;
-    if (frames_lost_ % 2 == 1) query.where = PoseSearch::Where::kSurfaces;
+    query.where = kTurns[static_cast<std::size_t>(frames_lost_) % kTurns.size()];
     query.near = last_seen_;
     for (const Pose& pose : unclear_) query.candidates.push_back(camera_motion * pose);
     unclear_.clear();

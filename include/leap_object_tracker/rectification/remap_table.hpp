@@ -11,7 +11,8 @@ namespace leap_object_tracker {
 class RemapTable {
  public:
   RemapTable() = default;
-  /// @param map_u, map_v CV_32FC1, the source pixel of each pixel; outside the source: left black
+  /// @param map_u, map_v CV_32FC1, the source pixel of each pixel. Outside the source, the nearest
+  /// pixel of its border: so the end of what is seen makes no edge. Not finite: left black.
   RemapTable(const cv::Mat& map_u, const cv::Mat& map_v, const cv::Size& source_size);
 
   const cv::Size& size() const { return size_; }
@@ -22,7 +23,7 @@ class RemapTable {
   void fillRows(const cv::Mat& source, cv::Mat& target, int first, int last) const;
 
  private:
-  /// Pixels that have a source: [begin, end), but for the holes.
+  /// Pixels that are not black: [begin, end), but for the holes.
   struct Row {
     int begin = 0;
     int end = 0;

@@ -38,4 +38,8 @@ struct BrightRegion {
 /// @param image CV_8UC1
 std::vector<BrightRegion> findBrightRegions(const cv::Mat& image);
 
+/// The same of the negative: what is darker than all around it, as in a lit room before a bright
+/// wall.
+std::vector<BrightRegion> findDarkRegions(const cv::Mat& image);
+
 }  // namespace leap_object_tracker

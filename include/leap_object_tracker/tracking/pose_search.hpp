@@ -33,9 +33,9 @@ struct FoundPose {
 
 /// Finds an object anywhere in the working volume, in one frame.
 ///
-/// 1. Places: stable bright regions (findBrightRegions) whose size fits the object; depth from the
-///    same region in the other eye, else from the region's area. Or surfaces that both eyes see
-///    (SurfacePlaces).
+/// 1. Places: stable bright or dark regions (findBrightRegions) whose size fits the object; depth
+///    from the same region in the other eye, else from the region's area. Or surfaces that both
+///    eyes see (SurfacePlaces).
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
 ///    of equivalent ones, shifted and scaled to the reach of each region in both eyes; scored by
 ///    the blunt contour likelihood and by that reach. The best are fitted to it in all six
@@ -53,6 +53,7 @@ class PoseSearch {
   /// Where find() looks.
   enum class Where {
     kBrightRegions,  ///< what is brighter than all around it
+    kDarkRegions,    ///< what is darker, as before a lit wall
     kSurfaces,       ///< surfaces that both eyes see; bright regions if there are none
   };
 
@@ -98,7 +99,7 @@ class PoseSearch {
 
   std::vector<Hypothesis> startsAtRegions(const std::vector<Place>& places) const;
   std::vector<Hypothesis> startsAtSurfaces(const RectifiedStereoFrame& frame) const;
-  std::vector<Place> findPlaces(const RectifiedStereoFrame& frame) const;
+  std::vector<Place> findPlaces(const RectifiedStereoFrame& frame, bool dark) const;
   /// Origin and rotation of the object as one eye sees them.
   std::pair<Eigen::Vector3f, Eigen::Matrix3f> seenFrom(const ParticlePose& pose,
                                                        std::size_t eye) const;

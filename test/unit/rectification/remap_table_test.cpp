@@ -47,18 +47,21 @@ TEST(RemapTable, interpolatesBetweenFourNeighbours) {
       EXPECT_NEAR(target.at<std::uint8_t>(v, u), 5 * (u + 0.4) + 3 * (v + 0.25), 0.53);
 }
 
-TEST(RemapTable, leavesBlackWhatHasNoSource) {
+TEST(RemapTable, continuesTheBorderOfTheSource) {
   const cv::Mat target = filled(shift(-3, 2), ramp());
-  EXPECT_EQ(target.at<std::uint8_t>(0, 2), 0);
+  for (int u = 0; u < 3; ++u) EXPECT_EQ(target.at<std::uint8_t>(0, u), 6);
   EXPECT_EQ(target.at<std::uint8_t>(0, 3), 6);
-  EXPECT_EQ(target.at<std::uint8_t>(4, 20), 0);
+  EXPECT_EQ(target.at<std::uint8_t>(0, 4), 11);
+  for (int v = 3; v < 6; ++v) EXPECT_NEAR(target.at<std::uint8_t>(v, 20), 5 * 17 + 3 * 5, 1);
+  const cv::Mat right = filled(shift(30, 0), ramp());
+  for (int u = 10; u < 40; ++u) EXPECT_NEAR(right.at<std::uint8_t>(2, u), 5 * 39 + 3 * 2, 1);
 }
 
 TEST(RemapTable, leavesHolesBlack) {
   const cv::Mat source = ramp();
   cv::Mat map_u(1, 40, CV_32FC1, cv::Scalar(7)), map_v(1, 40, CV_32FC1, cv::Scalar(2));
   map_u.at<float>(0, 20) = NAN;
-  map_u.at<float>(0, 21) = -1e4F;
+  map_v.at<float>(0, 21) = INFINITY;
   const cv::Mat target = filled(RemapTable(map_u, map_v, source.size()), source);
   EXPECT_EQ(target.at<std::uint8_t>(0, 19), 41);
   EXPECT_EQ(target.at<std::uint8_t>(0, 20), 0);

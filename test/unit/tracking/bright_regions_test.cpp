@@ -99,6 +99,16 @@ TEST(BrightRegions, doNotKnowHowFarTheyReachBeyondTheImage) {
   EXPECT_EQ(region.known[8], 0);  // to the left
 }
 
+TEST(DarkRegions, areThoseOfTheNegative) {
+  cv::Mat image(240, 320, CV_8UC1, cv::Scalar(150));
+  const cv::Rect box(100, 60, 60, 40);
+  image(box).setTo(90);
+  const auto regions = findDarkRegions(image);
+  ASSERT_FALSE(regions.empty());
+  expectBox(nearestTo(regions, box), box, 1.6);
+  EXPECT_TRUE(findDarkRegions(cv::Mat()).empty());
+}
+
 TEST(BrightRegions, areNoneInTheDark) {
   EXPECT_TRUE(findBrightRegions(dark()).empty());
   EXPECT_TRUE(findBrightRegions(cv::Mat()).empty());

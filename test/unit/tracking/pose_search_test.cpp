@@ -48,6 +48,17 @@ INSTANTIATE_TEST_SUITE_P(EitherWay, SearchedBox,
                          ::testing::Values(PoseSearch::Where::kBrightRegions,
                                            PoseSearch::Where::kSurfaces));
 
+class DarkBox : public SearchedBox {};
+
+TEST_P(DarkBox, isFoundBeforeABrightWall) {
+  for (cv::Mat* eye : {&frame_.left, &frame_.right}) *eye = 255 - *eye;
+  expectFound();
+}
+
+INSTANTIATE_TEST_SUITE_P(EitherWay, DarkBox,
+                         ::testing::Values(PoseSearch::Where::kDarkRegions,
+                                           PoseSearch::Where::kSurfaces));
+
 TEST(SearchedSquare, hasARivalWhereTurnedItLooksTheSame) {
   const ObjectModel object = squareFaced();
   const RectifiedStereoCamera camera = roundCamera();

@@ -66,6 +66,15 @@ TEST_F(Shaded, isTheSameForABrighterBody) {
   EXPECT_NEAR(score(cube_, castFrame(cube_, truth, camera_, dim), truth), bright, 0.1 * bright);
 }
 
+TEST_F(Shaded, allowsForLightFromAllAround) {
+  const Pose left = turnedBy({0, 0.5, 0}), right = turnedBy({0, -0.5, 0});
+  RectifiedStereoFrame frame = castFrame(cube_, left, camera_);
+  const double in_the_dark = score(cube_, frame, left);
+  for (cv::Mat* eye : {&frame.left, &frame.right}) *eye += 80;
+  EXPECT_GT(score(cube_, frame, left), score(cube_, frame, right) + 10);
+  EXPECT_GT(score(cube_, frame, left), 0.9 * in_the_dark);
+}
+
 TEST_F(Shaded, knowsTheShadowThatABodyThrowsOnItself) {
   const Mesh body = plateWithWall();
   const Pose pose = turnedBy({0.1, 0.45, 0});

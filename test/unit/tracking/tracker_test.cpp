@@ -62,6 +62,26 @@ TEST_F(MovingBox, isFoundFromNothingWithinThreeFrames) {
             0.05);
 }
 
+TEST_F(MovingBox, isFoundByOneEyeBeforeABrightWallWithinThreeFrames) {
+  TrackerParams params;
+  params.eyes = Eyes::kLeft;
+  Tracker tracker(params, object_, camera_);
+  tracker.search();
+  std::optional<PoseEstimate> estimate;
+  int frame = 0;
+  for (; frame < 3 && !estimate; ++frame) {
+    RectifiedStereoFrame seen = frameAt(frame);
+    seen.left = 255 - seen.left;
+    seen.right.release();
+    estimate = tracker.track(seen);
+  }
+  ASSERT_TRUE(estimate);
+  EXPECT_LT(positionError(*estimate, frame - 1), 0.003);
+  EXPECT_LT(angleBetween(estimate->camera_from_object.linear(), truthAt(frame - 1).linear(),
+                         object_.symmetry),
+            0.05);
+}
+
 TEST(NearBox, isFoundThoughTheBorderCutsIt) {
   const RectifiedStereoCamera camera = roundCamera();
   const ObjectModel object = box(0.04, 0.06, 0.09);
