@@ -9,6 +9,7 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
+#include "leap_object_tracker/tracking/edge_places.hpp"
 #include "tracking/random.hpp"
 
 namespace leap_object_tracker {
@@ -58,7 +59,11 @@ constexpr float kToBeExpected = 0.65F;
 constexpr std::size_t kMostSurfaces = 40;  // where a body may be
 constexpr double kSurfaceStep = 0.35;      // of the body's size, to the poses beside such a place
 constexpr std::size_t kKeptAtSurface = 10, kRefinedAtSurface = 3;
-constexpr std::size_t kNear = 10'000;  // number of the place of the pose to look near
+constexpr std::size_t kMostOriented = 400'000;  // poses at places among edges
+constexpr std::size_t kAmongEdges = 24;         // such places that are looked at more closely
+constexpr double kApartAmongEdges = 0.7;        // of the body's size, between these
+constexpr std::size_t kKeptAmongEdges = 4;      // hypotheses at all but the likeliest
+constexpr std::size_t kNear = 10'000;           // number of the place of the pose to look near
 constexpr EdgeKernel kBlunt{3.0F, 3.0F};
 
 /// Even set over SO(3) (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1).
@@ -540,6 +545,17 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::startsAtRegions(
   return kept;
 }
 
+/// Adds all orientations at a place.
+void PoseSearch::addOriented(const Eigen::Vector3d& place, const Eigen::Matrix3d& facing,
+                             std::size_t index, std::vector<Hypothesis>& hypotheses) const {
+  for (const auto& orientation : orientations_) {
+    Pose pose = Pose::Identity();
+    pose.linear() = facing * orientation;
+    pose.translation() = place;
+    hypotheses.push_back({toParticlePose(pose), 0, index});
+  }
+}
+
 /// Orientations at and around each place where the eyes see a surface.
 std::vector<PoseSearch::Hypothesis> PoseSearch::startsAtSurfaces(
     const RectifiedStereoFrame& frame) const {
@@ -550,17 +566,60 @@ std::vector<PoseSearch::Hypothesis> PoseSearch::startsAtSurfaces(
   for (std::size_t index = 0; index < places.size(); ++index) {
     hypotheses.clear();
     const Eigen::Matrix3d facing = facingTo(places[index]);
-    for (const auto& orientation : orientations_)
-      for (int x = -1; x <= 1; ++x)
-        for (int y = -1; y <= 1; ++y) {
-          Pose pose = Pose::Identity();
-          pose.linear() = facing * orientation;
-          pose.translation() = places[index] + facing * Eigen::Vector3d(x * step, y * step, 0);
-          hypotheses.push_back({toParticlePose(pose), 0, index});
-        }
+    for (int x = -1; x <= 1; ++x)
+      for (int y = -1; y <= 1; ++y)
+        addOriented(places[index] + facing * Eigen::Vector3d(x * step, y * step, 0), facing, index,
+                    hypotheses);
     scoreAll(hypotheses, kCoarsePoints, mapsFor(places[index].z(), 1), {});
     for (const Hypothesis& hypothesis : distinct(hypotheses, kKeptAtSurface, 0.2))
       kept.push_back(hypothesis);
+  }
+  return kept;
+}
+
+/// Orientations at the likeliest places among the edges of one eye.
+std::vector<PoseSearch::Hypothesis> PoseSearch::startsAmongEdges() const {
+  const std::size_t eye = fields_[0].seen() ? 0 : 1;
+  if (!fields_[eye].seen()) return {};
+  const double size = surface_places_.size();
+  std::vector<Eigen::Vector3d> places =
+      placesAmongEdges(fields_[eye], camera_, eye == 0 ? 0 : camera_.baseline,
+                       params_.volume.nearest, params_.volume.farthest, size);
+  const std::size_t most = kMostOriented / orientations_.size();
+  if (places.size() > most) {
+    // More than can be looked at are thinned evenly.
+    for (std::size_t i = 0; i < most; ++i) places[i] = places[i * places.size() / most];
+    places.resize(most);
+  }
+  const auto oriented = [&](std::size_t index) {
+    std::vector<Hypothesis> here;
+    addOriented(places[index], facingTo(places[index]), index, here);
+    scoreAll(here, kCoarsePoints, mapsFor(places[index].z(), 1), {});
+    return here;
+  };
+  std::vector<float> best(places.size());
+  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t index) {
+    best[index] = std::numeric_limits<float>::lowest();
+    for (const Hypothesis& hypothesis : oriented(index))
+      best[index] = std::max(best[index], hypothesis.score);
+  });
+  std::vector<std::size_t> order(places.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return best[a] > best[b]; });
+  std::vector<Hypothesis> kept;
+  std::vector<Eigen::Vector3d> taken;
+  for (const std::size_t index : order) {
+    if (taken.size() >= kAmongEdges) break;
+    if (std::any_of(taken.begin(), taken.end(), [&](const Eigen::Vector3d& other) {
+          return (other - places[index]).norm() < kApartAmongEdges * size;
+        }))
+      continue;
+    std::vector<Hypothesis> here = oriented(index);
+    for (const Hypothesis& hypothesis :
+         distinct(here, taken.size() < kLikelyPlaces ? kKeptAtLikely : kKeptAmongEdges, 0.2))
+      kept.push_back(hypothesis);
+    taken.push_back(places[index]);
   }
   return kept;
 }
@@ -580,8 +639,8 @@ std::optional<FoundPose> PoseSearch::find(const RectifiedStereoFrame& frame, con
 
   std::vector<Place> places;
   std::vector<Hypothesis> kept;
-  if (query.where == Where::kSurfaces && params_.eyes == Eyes::kBoth)
-    kept = startsAtSurfaces(frame);
+  if (query.where == Where::kSurfaces)
+    kept = fields_[0].seen() && fields_[1].seen() ? startsAtSurfaces(frame) : startsAmongEdges();
   if (kept.empty()) {
     places = findPlaces(frame, query.where == Where::kDarkRegions);
     kept = startsAtRegions(places);
@@ -640,9 +699,9 @@ std::optional<FoundPose> PoseSearch::find(const RectifiedStereoFrame& frame, con
     while (last < kept.size() && kept[last].place == kept[first].place) ++last;
     const std::size_t place = kept[first].place;
     const bool surface = places.empty() && place != kNear;
-    const std::size_t count = surface                         ? kRefinedAtSurface
-                              : last - first > kKeptElsewhere ? kRefinedAtLikely
-                                                              : kRefinedElsewhere;
+    const std::size_t count = last - first > kKeptAtSurface ? kRefinedAtLikely
+                              : surface                     ? kRefinedAtSurface
+                                                            : kRefinedElsewhere;
     // Shaped ones may be better than what edges made of them.
     for (const auto* all : {&kept, &unmoved}) {
       std::vector<Hypothesis> here(all->begin() + static_cast<std::ptrdiff_t>(first),

@@ -84,6 +84,7 @@ constexpr double kFaintStrength = 0.1;  // [nats/px] of a pose that does not las
 constexpr double kProvenStrength = 0.3, kLeastStrength = 0.2;  // [nats/px] once, and until then
 constexpr double kFoundInside = 0.3;       // share of the contour inside the images
 constexpr double kLeastEvidence = 60;      // [nats] of a start: chance brings about as much
+constexpr double kLeastOfOneEye = 100;     // [nats] where no other eye can contradict
 constexpr double kClearStrength = 0.6;     // [nats/px] of a small one that needs less
 constexpr double kSameSurface = 0.1;       // of the radius, by which a body may differ from itself
 constexpr double kClearLead = 20;          // [nats] of a start over the same body turned otherwise
@@ -336,7 +337,8 @@ class Tracker::Impl {
     if (found.evidence >= kCompelling)
       return found.support() >= (elsewhere ? kFoundSupport : kCompelledSupport) &&
              found.insideShare() >= kCompelledInside;
-    if (!near && found.evidence < kLeastEvidence && found.strength() < kClearStrength) return false;
+    const double least = params_.eyes == Eyes::kBoth ? kLeastEvidence : kLeastOfOneEye;
+    if (!near && found.evidence < least && found.strength() < kClearStrength) return false;
     return found.support() >= (near ? kRefoundSupport : kFoundSupport) &&
            found.strength() >= (near ? kRefoundStrength : kFoundStrength) &&
            found.insideShare() >= kFoundInside;

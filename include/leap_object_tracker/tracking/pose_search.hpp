@@ -39,7 +39,8 @@ struct FoundPose {
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
 ///    of equivalent ones, shifted and scaled to the reach of each region in both eyes; scored by
 ///    the blunt contour likelihood and by that reach. The best are fitted to it in all six
-///    directions. At a surface: the same set at and beside its place, scored by the contour alone.
+///    directions. At a surface or among edges: the same set at and beside its place, scored by the
+///    contour alone.
 /// 3. The best ones move in random steps that shrink; before and after that they are refined on
 ///    sub-pixel edges, and ranked by their contour and by how the eyes agree on the texture inside
 ///    it (EyeAgreement).
@@ -54,7 +55,8 @@ class PoseSearch {
   enum class Where {
     kBrightRegions,  ///< what is brighter than all around it
     kDarkRegions,    ///< what is darker, as before a lit wall
-    kSurfaces,       ///< surfaces that both eyes see; bright regions if there are none
+    kSurfaces,       ///< surfaces that both eyes see, with one eye places among edges; bright
+                     ///< regions if there are none
   };
 
   struct Query {
@@ -99,6 +101,9 @@ class PoseSearch {
 
   std::vector<Hypothesis> startsAtRegions(const std::vector<Place>& places) const;
   std::vector<Hypothesis> startsAtSurfaces(const RectifiedStereoFrame& frame) const;
+  std::vector<Hypothesis> startsAmongEdges() const;
+  void addOriented(const Eigen::Vector3d& place, const Eigen::Matrix3d& facing, std::size_t index,
+                   std::vector<Hypothesis>& hypotheses) const;
   std::vector<Place> findPlaces(const RectifiedStereoFrame& frame, bool dark) const;
   /// Origin and rotation of the object as one eye sees them.
   std::pair<Eigen::Vector3f, Eigen::Matrix3f> seenFrom(const ParticlePose& pose,

@@ -17,9 +17,11 @@ class SearchedBox : public ::testing::TestWithParam<PoseSearch::Where> {
     frame_.left = cv::max(frame_.left, alone.left);
     frame_.right = cv::max(frame_.right, alone.right);
   }
-  void expectFound() {
-    const ContourModel model(object_, TrackerParams().contour.points);
-    PoseSearch search(TrackerParams(), object_, model, camera_);
+  void expectFound(Eyes eyes = Eyes::kBoth) {
+    TrackerParams params;
+    params.eyes = eyes;
+    const ContourModel model(object_, params.contour.points);
+    PoseSearch search(params, object_, model, camera_);
     const auto found = search.find(frame_, {GetParam(), {}, {}}, [](const FoundPose& pose) {
       return pose.refined.support() > 0.7 && pose.refined.evidence > 60;
     });
@@ -44,6 +46,11 @@ TEST_P(SearchedBox, isFoundBetweenFingersThatTouchIt) {
   expectFound();
 }
 
+TEST_P(SearchedBox, isFoundByOneEye) {
+  frame_.left.release();
+  expectFound(Eyes::kRight);
+}
+
 INSTANTIATE_TEST_SUITE_P(EitherWay, SearchedBox,
                          ::testing::Values(PoseSearch::Where::kBrightRegions,
                                            PoseSearch::Where::kSurfaces));
@@ -53,6 +60,7 @@ class DarkBox : public SearchedBox {};
 TEST_P(DarkBox, isFoundBeforeABrightWall) {
   for (cv::Mat* eye : {&frame_.left, &frame_.right}) *eye = 255 - *eye;
   expectFound();
+  expectFound(Eyes::kLeft);
 }
 
 INSTANTIATE_TEST_SUITE_P(EitherWay, DarkBox,
