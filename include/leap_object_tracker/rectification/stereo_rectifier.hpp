@@ -29,8 +29,8 @@ class StereoRectifier {
  public:
   StereoRectifier(const StereoCalibration& calibration, const RectifiedStereoCamera& target);
 
-  /// Bilinear. Beyond the border of the raw image its nearest pixel goes on, so that the border makes
-  /// no edge; 0 where the lens has no ray.
+  /// Bilinear. Beyond the border of the raw image its nearest pixel goes on, so that the border
+  /// makes no edge; 0 where the lens has no ray.
   /// @throw std::invalid_argument if the frame is not 8-bit grey of the calibrated size. An empty
   /// eye stays empty.
   RectifiedStereoFrame rectify(const RawStereoFrame& frame) const;
