@@ -88,6 +88,7 @@ constexpr double kLeastOfOneEye = 100;     // [nats] where no other eye can cont
 constexpr double kClearStrength = 0.6;     // [nats/px] of a small one that needs less
 constexpr double kSameSurface = 0.1;       // of the radius, by which a body may differ from itself
 constexpr double kClearLead = 20;          // [nats] of a start over the same body turned otherwise
+constexpr double kClearLeadOfMesh = 40;    // of one whose contour is modelled less exactly
 constexpr double kCompelling = 160;        // [nats] of evidence that chance does not bring about
 constexpr double kCompelledSupport = 0.6;  // and what then is enough
 constexpr double kCompelledInside = 0.15;  // likewise
@@ -346,7 +347,7 @@ class Tracker::Impl {
 
   /// Whether the image tells a found pose from those in which the body would be elsewhere.
   bool isClear(const FoundPose& found) const {
-    if (found.lead >= kClearLead) return true;
+    if (found.lead >= (object_.shape == Shape::kMesh ? kClearLeadOfMesh : kClearLead)) return true;
     const Pose turn = found.refined.camera_from_object.inverse() * *found.rival;
     const double slack = kSameSurface * model_.radius();
     return std::all_of(object_.mesh.vertices.begin(), object_.mesh.vertices.end(),
