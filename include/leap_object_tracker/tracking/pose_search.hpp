@@ -35,7 +35,7 @@ struct FoundPose {
 ///
 /// 1. Places: stable bright or dark regions (findBrightRegions) whose size fits the object; depth
 ///    from the same region in the other eye, else from the region's area. Or surfaces that both
-///    eyes see (SurfacePlaces).
+///    eyes see (SurfacePlaces), with one eye all that has edges enough (placesAmongEdges).
 /// 2. Orientations: an even set over SO(3) (super-Fibonacci spirals, Alexa 2022), one of each class
 ///    of equivalent ones, shifted and scaled to the reach of each region in both eyes; scored by
 ///    the blunt contour likelihood and by that reach. The best are fitted to it in all six
