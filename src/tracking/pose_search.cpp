@@ -63,7 +63,8 @@ constexpr std::size_t kMostOriented = 400'000;  // poses at places among edges
 constexpr std::size_t kAmongEdges = 24;         // such places that are looked at more closely
 constexpr double kApartAmongEdges = 0.7;        // of the body's size, between these
 constexpr std::size_t kKeptAmongEdges = 4;      // hypotheses at all but the likeliest
-constexpr std::size_t kNear = 10'000;           // number of the place of the pose to look near
+// Number of the place of the pose to look near: of no other.
+constexpr std::size_t kNear = std::numeric_limits<std::size_t>::max();
 constexpr EdgeKernel kBlunt{3.0F, 3.0F};
 
 /// Even set over SO(3) (Alexa, "Super-Fibonacci spirals", CVPR 2022, algorithm 1).

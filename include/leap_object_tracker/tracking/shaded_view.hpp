@@ -14,8 +14,7 @@ struct DepthView;
 
 /// How well the grey values of an image agree with a matt body of one brightness at a pose, lit by
 /// the three lamps of the device and by even light from all around: tells a body from its turned
-/// self where their outlines are alike.
-/// Of a textured body it says little, of either.
+/// self where their outlines are alike. Of a textured body it says little, of either.
 class ShadedView {
  public:
   ShadedView(const Mesh& mesh, const RectifiedStereoCamera& camera);
@@ -24,9 +23,8 @@ class ShadedView {
   ///   -n/2 log(sum (I - min(255, a L + b))^2 / sum I^2),
   /// L the Lambert shading with the shadows that the body throws on itself, a and b (not negative)
   /// its best scale and what even light adds, n the independent grey values inside the silhouettes
-  /// (two pixels off their rims). Differences
-  /// between poses of one place have a meaning; zero where no eye sees enough of the body.
-  /// Saturated pixels only say that they are bright.
+  /// (two pixels off their rims). Differences between poses of one place have a meaning; zero where
+  /// no eye sees enough of the body. Saturated pixels only say that they are bright.
   double logLikelihood(const std::array<EdgeField, 2>& fields,
                        const Pose& camera_from_object) const;
 

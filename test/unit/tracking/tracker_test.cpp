@@ -33,6 +33,26 @@ class MovingBox : public ::testing::Test {
   double positionError(const PoseEstimate& estimate, int frame) const {
     return (estimate.camera_from_object.translation() - truthAt(frame).translation()).norm();
   }
+  /// @param tolerance [m]
+  /// @param change of what the eyes see
+  template <class Change>
+  void expectFoundWithinThreeFrames(const TrackerParams& params, double tolerance,
+                                    const Change& change) const {
+    Tracker tracker(params, object_, camera_);
+    tracker.search();
+    std::optional<PoseEstimate> estimate;
+    int frame = 0;
+    for (; frame < 3 && !estimate; ++frame) {
+      RectifiedStereoFrame seen = frameAt(frame);
+      change(seen);
+      estimate = tracker.track(seen);
+    }
+    ASSERT_TRUE(estimate);
+    EXPECT_LT(positionError(*estimate, frame - 1), tolerance);
+    EXPECT_LT(angleBetween(estimate->camera_from_object.linear(), truthAt(frame - 1).linear(),
+                           object_.symmetry),
+              0.05);
+  }
 
   const RectifiedStereoCamera camera_ = roundCamera();
   const ObjectModel object_ = box(0.03, 0.04, 0.05);
@@ -50,36 +70,16 @@ TEST_F(MovingBox, isFollowedFromAStartPose) {
 }
 
 TEST_F(MovingBox, isFoundFromNothingWithinThreeFrames) {
-  Tracker tracker(TrackerParams(), object_, camera_);
-  tracker.search();
-  std::optional<PoseEstimate> estimate;
-  int frame = 0;
-  for (; frame < 3 && !estimate; ++frame) estimate = tracker.track(frameAt(frame));
-  ASSERT_TRUE(estimate);
-  EXPECT_LT(positionError(*estimate, frame - 1), 0.002);
-  EXPECT_LT(angleBetween(estimate->camera_from_object.linear(), truthAt(frame - 1).linear(),
-                         object_.symmetry),
-            0.05);
+  expectFoundWithinThreeFrames({}, 0.002, [](RectifiedStereoFrame&) {});
 }
 
 TEST_F(MovingBox, isFoundByOneEyeBeforeABrightWallWithinThreeFrames) {
   TrackerParams params;
   params.eyes = Eyes::kLeft;
-  Tracker tracker(params, object_, camera_);
-  tracker.search();
-  std::optional<PoseEstimate> estimate;
-  int frame = 0;
-  for (; frame < 3 && !estimate; ++frame) {
-    RectifiedStereoFrame seen = frameAt(frame);
-    seen.left = 255 - seen.left;
-    seen.right.release();
-    estimate = tracker.track(seen);
-  }
-  ASSERT_TRUE(estimate);
-  EXPECT_LT(positionError(*estimate, frame - 1), 0.003);
-  EXPECT_LT(angleBetween(estimate->camera_from_object.linear(), truthAt(frame - 1).linear(),
-                         object_.symmetry),
-            0.05);
+  expectFoundWithinThreeFrames(params, 0.003, [](RectifiedStereoFrame& frame) {
+    frame.left = 255 - frame.left;
+    frame.right.release();
+  });
 }
 
 TEST(NearBox, isFoundThoughTheBorderCutsIt) {
