@@ -126,18 +126,22 @@ double diameterOf(const Mesh& mesh) {
   return largest;
 }
 
-ShadowArea shadowAreaOf(const Mesh& mesh) {
-  constexpr int kPoints = 6000, kDirections = 60, kCells = 40;  // along the diameter
+Eigen::Vector3d evenDirection(int i, int count) {
+  const double z = 1 - (2 * i + 1.0) / count, ring = std::sqrt(1 - z * z);
+  const double angle = i * M_PI * (3 - std::sqrt(5.0));
+  return {ring * std::cos(angle), ring * std::sin(angle), z};
+}
+
+std::vector<Eigen::Vector3d> pointsOn(const Mesh& mesh, int count) {
   std::vector<double> areas;
   for (const auto& t : mesh.triangles)
     areas.push_back((mesh.vertices[t[1]] - mesh.vertices[t[0]])
                         .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]])
                         .norm());
-  const double step = std::accumulate(areas.begin(), areas.end(), 0.0) / kPoints;
-  if (!(step > 0)) return {};
-  // Evenly spread: one a share of the area, in a low-discrepancy sequence within the triangle
-  // (Roberts 2018, R2).
+  const double step = std::accumulate(areas.begin(), areas.end(), 0.0) / count;
   std::vector<Eigen::Vector3d> points;
+  if (!(step > 0)) return points;
+  // One a share of the area.
   double due = 0.5 * step;
   for (std::size_t i = 0; i < areas.size(); ++i) {
     const auto& t = mesh.triangles[i];
@@ -152,17 +156,21 @@ ShadowArea shadowAreaOf(const Mesh& mesh) {
     }
     due -= areas[i];
   }
+  return points;
+}
+
+ShadowArea shadowAreaOf(const Mesh& mesh) {
+  constexpr int kPoints = 6000, kDirections = 60, kCells = 40;  // along the diameter
+  const std::vector<Eigen::Vector3d> points = pointsOn(mesh, kPoints);
+  if (points.empty()) return {};
   const double radius = radiusOf(mesh), cell = 2 * radius / kCells;
   ShadowArea shadow;
   shadow.least = std::numeric_limits<double>::infinity();
   std::vector<bool> covered;
   for (int i = -3; i < kDirections; ++i) {
     // The axes first: along them bodies are often smallest or largest.
-    const double z = 1 - (2 * i + 1.0) / kDirections, ring = std::sqrt(std::max(0.0, 1 - z * z));
-    const double angle = i * M_PI * (3 - std::sqrt(5.0));
     const Eigen::Vector3d direction =
-        i < 0 ? Eigen::Vector3d::Unit(i + 3)
-              : Eigen::Vector3d(ring * std::cos(angle), ring * std::sin(angle), z);
+        i < 0 ? Eigen::Vector3d::Unit(i + 3) : evenDirection(i, kDirections);
     const Eigen::Matrix3d turn =
         Eigen::Quaterniond::FromTwoVectors(direction, Eigen::Vector3d::UnitZ()).toRotationMatrix();
     covered.assign((kCells + 1) * (kCells + 1), false);

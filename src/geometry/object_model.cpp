@@ -7,6 +7,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "leap_object_tracker/geometry/mesh_symmetry.hpp"
+
 namespace leap_object_tracker {
 namespace {
 
@@ -86,7 +88,8 @@ Eigen::Vector3d readSize(const ObjectFile& file, Shape shape) {
   return size;
 }
 
-Symmetry shapeSymmetry(Shape shape, const Eigen::Vector3d& size) {
+/// Of a mesh: see symmetryOf().
+Symmetry primitiveSymmetry(Shape shape, const Eigen::Vector3d& size) {
   const Eigen::Vector3d x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
   const auto same = [](double a, double b) { return std::abs(a - b) < 1e-6; };
   switch (shape) {
@@ -124,12 +127,17 @@ Symmetry::Axis readAxis(const ObjectFile& file, const YAML::Node& entry) {
   }
 }
 
-Symmetry readSymmetry(const ObjectFile& file, Shape shape, const Eigen::Vector3d& size) {
-  if (!file.has("symmetry")) return shapeSymmetry(shape, size);
+Symmetry ownSymmetry(const ObjectModel& object) {
+  return object.shape == Shape::kMesh ? symmetryOf(object.mesh)
+                                      : primitiveSymmetry(object.shape, object.size);
+}
+
+Symmetry readSymmetry(const ObjectFile& file, const ObjectModel& object) {
+  if (!file.has("symmetry")) return ownSymmetry(object);
   const YAML::Node node = file.node("symmetry");
   if (node.IsScalar()) {
     const auto word = node.as<std::string>();
-    if (word == "auto") return shapeSymmetry(shape, size);
+    if (word == "auto") return ownSymmetry(object);
     if (word == "none") return {};
   }
   std::vector<Symmetry::Axis> axes;
@@ -153,7 +161,7 @@ ObjectModel makePrimitive(const std::string& name, Shape shape, const Eigen::Vec
   object.shape = shape;
   object.size = size;
   object.mesh = shapeMesh(shape, size);
-  object.symmetry = shapeSymmetry(shape, size);
+  object.symmetry = primitiveSymmetry(shape, size);
   return object;
 }
 
@@ -186,7 +194,7 @@ ObjectModel loadObject(const std::string& path) {
     object = makePrimitive("", shape, readSize(file, shape));
   }
   object.name = file.read<std::string>("name", "a word");
-  object.symmetry = readSymmetry(file, shape, object.size);
+  object.symmetry = readSymmetry(file, object);
   if (file.has("textured")) object.textured = file.read<bool>("textured", "true or false");
   return object;
 }

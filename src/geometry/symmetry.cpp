@@ -1,7 +1,9 @@
 #include "leap_object_tracker/geometry/symmetry.hpp"
 
 #include <cmath>
+#include <iomanip>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 
 namespace leap_object_tracker {
@@ -55,6 +57,16 @@ Symmetry symmetryFromAxes(const std::vector<Symmetry::Axis>& axes) {
   }
   closeGroup(symmetry.rotations);
   return symmetry;
+}
+
+std::string describe(const Symmetry& symmetry) {
+  if (symmetry.trivial()) return "none";
+  const std::string turns = std::to_string(symmetry.rotations.size()) + " turns";
+  if (!symmetry.hasFreeAxis()) return turns;
+  std::ostringstream text;
+  text << std::setprecision(3) << "any turn about (" << symmetry.free_axis.x() << ", "
+       << symmetry.free_axis.y() << ", " << symmetry.free_axis.z() << ")";
+  return symmetry.rotations.size() > 1 ? text.str() + " and " + turns : text.str();
 }
 
 Pose nearestEquivalent(const Pose& pose, const Pose& reference, const Symmetry& symmetry) {

@@ -234,6 +234,8 @@ class BagTracking {
     if (line_.has("covariances")) writeCovariances(line_.text("covariances"), poses_);
     std::vector<double> sorted = total_ms_;
     std::sort(sorted.begin(), sorted.end());
+    std::printf("object            %s, symmetry: %s\n", object_.name.c_str(),
+                describe(object_.symmetry).c_str());
     std::printf("frames            %zu, %zu with a pose, %zu without\n", frames_.size(),
                 poses_.size(), frames_.size() - poses_.size());
     const ErrorStatistics time = statisticsOf(total_ms_);

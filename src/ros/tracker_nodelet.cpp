@@ -105,7 +105,8 @@ class TrackerNodelet : public nodelet::Nodelet {
       order = {TrackerOrder::Kind::kStart, *last_pose_};
     tracker_.reset();
     tracker_ = std::make_unique<Tracker>(params_.tracker, object_, camera);
-    NODELET_INFO_STREAM("tracks '" << object_.name << "' in images of " << camera.size);
+    NODELET_INFO_STREAM("tracks '" << object_.name << "' (symmetry: " << describe(object_.symmetry)
+                                   << ") in images of " << camera.size);
     carryOut(order);
   }
 

@@ -27,7 +27,7 @@ HWY_INLINE Float softplus(Float x) {
 
 HWY_INLINE Float length(Float x, Float y) { return hn::Sqrt(hn::MulAdd(x, x, hn::Mul(y, y))); }
 
-// As the scalar functions of the same names in feature_distance.cpp.
+// As the scalar functions of the same names in signed_distance.cpp.
 
 HWY_INLINE Float boxDistance(Float x, Float y, Float z, const Eigen::Vector3f& half) {
   const Floats df;

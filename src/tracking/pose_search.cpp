@@ -82,13 +82,6 @@ std::vector<Eigen::Matrix3d> evenRotations(int count) {
   return rotations;
 }
 
-/// Direction i of `count` that are spread evenly (Fibonacci lattice).
-Eigen::Vector3d evenDirection(int i, int count) {
-  const double z = 1 - (2 * i + 1.0) / count, ring = std::sqrt(1 - z * z);
-  const double angle = i * M_PI * (3 - std::sqrt(5.0));
-  return {ring * std::cos(angle), ring * std::sin(angle), z};
-}
-
 /// Orientations are laid out as seen along the ray to a place.
 Eigen::Matrix3d facingTo(const Eigen::Vector3d& place) {
   return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), place).toRotationMatrix();

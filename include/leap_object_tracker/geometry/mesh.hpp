@@ -33,6 +33,12 @@ double radiusOf(const Mesh& mesh);
 /// most).
 double diameterOf(const Mesh& mesh);
 
+/// Direction i of `count` that are spread evenly over the sphere (Fibonacci lattice).
+Eigen::Vector3d evenDirection(int i, int count);
+/// About `count` points spread evenly over the surface [m] (low-discrepancy sequence R2, Roberts
+/// 2018); none if it has no area.
+std::vector<Eigen::Vector3d> pointsOn(const Mesh& mesh, int count);
+
 /// Area of the shadow that a body throws in parallel light [m^2], over directions all around.
 struct ShadowArea {
   double least = 0, mean = 0, largest = 0;

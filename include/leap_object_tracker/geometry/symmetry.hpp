@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <string>
 #include <vector>
 
 #include "leap_object_tracker/geometry/pose.hpp"
@@ -28,6 +29,9 @@ struct Symmetry {
 /// @throw std::invalid_argument for a zero axis, a negative order, two free axes, or a group of
 /// more than 120 elements (axes that do not fit each other).
 Symmetry symmetryFromAxes(const std::vector<Symmetry::Axis>& axes);
+
+/// Such as "none", "24 turns" or "any turn about (0, 0, 1)".
+std::string describe(const Symmetry& symmetry);
 
 /// The pose among the equivalents of `pose` whose orientation is nearest to `reference`.
 Pose nearestEquivalent(const Pose& pose, const Pose& reference, const Symmetry& symmetry);

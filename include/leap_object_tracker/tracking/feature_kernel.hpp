@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "leap_object_tracker/tracking/feature_distance.hpp"
+#include "leap_object_tracker/geometry/signed_distance.hpp"
 #include "leap_object_tracker/tracking/measurement_model.hpp"
 
 namespace leap_object_tracker {

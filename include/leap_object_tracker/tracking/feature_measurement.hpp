@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "leap_object_tracker/geometry/object_model.hpp"
-#include "leap_object_tracker/tracking/feature_distance.hpp"
+#include "leap_object_tracker/geometry/signed_distance.hpp"
 #include "leap_object_tracker/tracking/feature_extractor.hpp"
 #include "leap_object_tracker/tracking/feature_kernel.hpp"
 #include "leap_object_tracker/tracking/feature_landmarks.hpp"

@@ -33,6 +33,14 @@ TEST(Symmetry, ofACylinderIsAFreeAxisAndAHalfTurn) {
   EXPECT_NEAR(angleBetween(turn(0, 0, 0), turn(0.3, 0, 0), symmetry), 0.3, 1e-9);
 }
 
+TEST(Symmetry, isSaidInWords) {
+  EXPECT_EQ(describe({}), "none");
+  EXPECT_EQ(describe(makePrimitive("cube", Shape::kBox, {1, 1, 1}).symmetry), "24 turns");
+  EXPECT_EQ(describe(symmetryFromAxes({{{0, 0, 2}, 0}})), "any turn about (0, 0, 1)");
+  EXPECT_EQ(describe(makePrimitive("can", Shape::kCylinder, {1, 2, 0}).symmetry),
+            "any turn about (0, 0, 1) and 2 turns");
+}
+
 TEST(Symmetry, countsOnlyTheTurnThatShows) {
   const Symmetry symmetry = makePrimitive("cube", Shape::kBox, {1, 1, 1}).symmetry;
   EXPECT_NEAR(angleBetween(turn(0, 0, 0), turn(0, 0, M_PI / 2 + 0.1), symmetry), 0.1, 1e-9);

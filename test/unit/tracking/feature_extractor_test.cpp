@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "leap_object_tracker/tracking/feature_distance.hpp"
+#include "leap_object_tracker/geometry/signed_distance.hpp"
 #include "support/textured_box.hpp"
 
 namespace leap_object_tracker {

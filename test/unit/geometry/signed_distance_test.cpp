@@ -1,4 +1,4 @@
-#include "leap_object_tracker/tracking/feature_distance.hpp"
+#include "leap_object_tracker/geometry/signed_distance.hpp"
 
 #include <gtest/gtest.h>
 
